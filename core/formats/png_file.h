@@ -1,0 +1,17 @@
+/** PNG files, 8 and 16 bit, grey to RGBA (libpng). */
+#ifndef WEFT_CORE_FORMATS_PNG_FILE_H
+#define WEFT_CORE_FORMATS_PNG_FILE_H
+
+#include "core/formats/raster.h"
+
+/** Reads a PNG; palettes and 1/2/4-bit greys are expanded.  WEFT_ERR_FORMAT names the file. */
+weft_err weft_png_read(const char *path, weft_raster *raster, weft_error *err);
+/** Writes a PNG of raster->bits, whole or not at all. */
+weft_err weft_png_write(const char *path, const weft_raster *raster, weft_error *err);
+
+/** Reads any PNG as a mask: non-zero luminance is inside. */
+weft_err weft_png_read_mask(const char *path, weft_mask *mask, weft_error *err);
+/** Writes a mask as 8-bit grey 0 / 255. */
+weft_err weft_png_write_mask(const char *path, const weft_mask *mask, weft_error *err);
+
+#endif
