@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Names in brackets are functions even where error.h makes macros of them for the analyzer. */
 static const struct {
     const char *name, *text;
     int exit_status;
@@ -16,7 +17,7 @@ static const struct {
 
 enum { N_CODES = sizeof codes / sizeof codes[0] };
 
-weft_err weft_fail(weft_error *err, weft_err code, const char *format, ...)
+weft_err(weft_fail)(weft_error *err, weft_err code, const char *format, ...)
 {
     assert(code != WEFT_OK);
     if (err) {
@@ -29,7 +30,7 @@ weft_err weft_fail(weft_error *err, weft_err code, const char *format, ...)
     return code;
 }
 
-weft_err weft_fail_errno(weft_error *err, weft_err code, const char *format, ...)
+weft_err(weft_fail_errno)(weft_error *err, weft_err code, const char *format, ...)
 {
     const int number = errno;
     assert(code != WEFT_OK);
@@ -45,7 +46,7 @@ weft_err weft_fail_errno(weft_error *err, weft_err code, const char *format, ...
     return code;
 }
 
-weft_err weft_prefix(weft_error *err, weft_err code, const char *format, ...)
+weft_err(weft_prefix)(weft_error *err, weft_err code, const char *format, ...)
 {
     if (!err)
         return code;

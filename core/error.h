@@ -62,6 +62,13 @@ weft_err weft_fail_errno(weft_error *err, weft_err code, const char *format, ...
 /** Puts "format: " in front of the text that is there and returns `code`, so that it can be returned. */
 weft_err weft_prefix(weft_error *err, weft_err code, const char *format, ...) WEFT_PRINTF(3, 4);
 
+#ifdef __clang_analyzer__
+/* The analyzer cannot see that these return `code`, and would follow failures as if they were WEFT_OK. */
+#define weft_fail(err, code, ...)       (weft_fail(err, code, __VA_ARGS__), (code))
+#define weft_fail_errno(err, code, ...) (weft_fail_errno(err, code, __VA_ARGS__), (code))
+#define weft_prefix(err, code, ...)     (weft_prefix(err, code, __VA_ARGS__), (code))
+#endif
+
 /** @return "IO", "FORMAT", ...; never NULL. */
 const char *weft_err_name(weft_err code);
 /** @return the general sentence of a code; never NULL. */

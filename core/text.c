@@ -17,8 +17,6 @@ static locale_t c_locale(void)
     return made;
 }
 
-extern double strtod_l(const char *restrict, char **restrict, locale_t);
-
 const char *weft_text_scan_double(const char *text, double *value)
 {
     char *end;
