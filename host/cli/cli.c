@@ -13,7 +13,7 @@ typedef struct common_args {
     bool help, json, force, quiet, verbose;
 } common_args;
 
-static const weft_field common_fields[] = {
+const weft_field weft_common_fields[] = {
     {.key = "json",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(common_args, json),
@@ -70,7 +70,7 @@ static void print_help(const weft_command *command, FILE *out)
         fprintf(out, "\n%s\n", command->details);
     fputs("\noptions:\n", out);
     weft_fields_print_help(command->fields, out);
-    weft_fields_print_help(common_fields, out);
+    weft_fields_print_help(weft_common_fields, out);
     fprintf(out, "\nexample:\n  %s\n", command->example);
 }
 
@@ -166,7 +166,7 @@ static int run_command(const weft_command *command, int argc, char **argv)
     const char **const operands = weft_alloc((size_t)argc + 1, sizeof *operands, &error);
     if (args && operands) {
         weft_fields_set_defaults(command->fields, args);
-        const weft_field *const tables[] = {command->fields, common_fields};
+        const weft_field *const tables[] = {command->fields, weft_common_fields};
         void *const structs[] = {args, &common};
         for (int i = 0; i < argc && strcmp(argv[i], "--") != 0; i++) /* --help wins over what is missing */
             common.help |= strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0;

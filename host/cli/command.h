@@ -35,6 +35,9 @@ typedef struct weft_command {
     weft_err (*run)(const weft_invocation *inv, const void *args, weft_error *err);
 } weft_command;
 
+/** The options that every command has; ends with {0}. */
+extern const weft_field weft_common_fields[];
+
 /** All commands, in the order of the help; ends with NULL. */
 extern const weft_command *const weft_commands[];
 
