@@ -64,6 +64,23 @@ bool weft_folder_exists(const char *path)
     return stat(path, &s) == 0 && S_ISDIR(s.st_mode);
 }
 
+weft_err weft_file_size(const char *path, uint64_t *bytes, weft_error *err)
+{
+    struct stat s;
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); /* a pipe must not hold us up */
+    if (fd < 0)
+        return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be opened", path);
+    const int result = fstat(fd, &s);
+    close(fd);
+    if (result != 0)
+        return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be looked at", path);
+    if (!S_ISREG(s.st_mode))
+        return weft_fail(err, WEFT_ERR_IO, "%s: is a %s, not a file", path,
+                         S_ISDIR(s.st_mode) ? "folder" : "device or pipe");
+    *bytes = (uint64_t)s.st_size;
+    return WEFT_OK;
+}
+
 weft_err weft_folder_create(const char *path, weft_error *err)
 {
     char *const partial = weft_strdup(path, err);
