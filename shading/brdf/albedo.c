@@ -1,0 +1,176 @@
+#include "shading/brdf/albedo.h"
+
+#include "shading/brdf/half.h"
+#include "shading/brdf/quadrature.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+#define MAX_BATCH (2 * WEFT_QUADRATURE_MAX)
+
+/* One integral under way. */
+typedef struct integral {
+    weft_albedo_fn *fn;
+    void *context;
+    weft_albedo_domain domain;
+    double nv, sv, view[3];
+    double tangent[2]; /* unit azimuth of the view */
+    weft_quadrature q;
+    double sum[3];
+} integral;
+
+/* Half the range of azimuths (from that of the view) in which half vectors at polar angle theta have
+ * n.l = 2 (v.h) nh - nv > 0 (UPPER), or v.h > 0 (VISIBLE). */
+static double azimuth_reach(const integral *in, weft_albedo_domain domain, double theta)
+{
+    const double nh = cos(theta), sh = sin(theta);
+    const double over = domain == WEFT_ALBEDO_UPPER ? in->nv * (1 - 2 * nh * nh) : -in->nv * nh * sh;
+    const double under = domain == WEFT_ALBEDO_UPPER ? 2 * nh * sh * in->sv : sh * sh * in->sv;
+    if (over <= -under)
+        return WEFT_PI;
+    if (over >= under)
+        return 0;
+    return acos(over / under);
+}
+
+/* Adds the half vectors at polar angle theta and azimuths begin..end on both sides of the view's. */
+static void add_arc(integral *in, double theta, double begin, double end, double weight)
+{
+    const double nh = cos(theta), sh = sin(theta);
+    double light[3][MAX_BATCH], view[3][MAX_BATCH], value[3][MAX_BATCH], w[MAX_BATCH];
+    int n = 0;
+    for (int side = -1; side <= 1; side += 2)
+        for (int i = 0; i < in->q.n; i++, n++) {
+            const double phi = side * (begin + (end - begin) * in->q.at[i]);
+            const double along = cos(phi), across = sin(phi);
+            const double h[3] = {sh * (along * in->tangent[0] - across * in->tangent[1]),
+                                 sh * (along * in->tangent[1] + across * in->tangent[0]), nh};
+            const double vh = in->sv * sh * along + in->nv * nh;
+            for (int c = 0; c < 3; c++) {
+                light[c][n] = 2 * vh * h[c] - in->view[c];
+                view[c][n] = in->view[c];
+            }
+            w[n] = weight * in->q.weight[i] * (end - begin) * sh * 4 * weft_max(vh, 0);
+            if (in->domain == WEFT_ALBEDO_UPPER)
+                w[n] *= weft_max(light[2][n], 0);
+        }
+    const weft_brdf_batch batch = {
+        .n = n, .light = {light[0], light[1], light[2]}, .view = {view[0], view[1], view[2]}};
+    double *const out[3] = {value[0], value[1], value[2]};
+    in->fn(in->context, &batch, out);
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < n; i++)
+            in->sum[c] += w[i] > 0 ? w[i] * value[c][i] : 0;
+}
+
+/* The ring is cut where the light meets the horizon: a density may have a kink there. */
+static void add_ring(integral *in, double theta, double weight)
+{
+    const double lit = azimuth_reach(in, WEFT_ALBEDO_UPPER, theta);
+    if (lit > 0)
+        add_arc(in, theta, 0, lit, weight);
+    if (in->domain == WEFT_ALBEDO_VISIBLE) {
+        const double reach = azimuth_reach(in, WEFT_ALBEDO_VISIBLE, theta);
+        if (reach > lit)
+            add_arc(in, theta, lit, reach, weight);
+    }
+}
+
+static void add_interval(integral *in, double begin, double end)
+{
+    for (int i = 0; i < in->q.n; i++) {
+        const double theta =
+            in->q.at[i] < 0.5 ? begin + (end - begin) * in->q.at[i] : end - (end - begin) * in->q.to_end[i];
+        if (theta > begin && theta < end)
+            add_ring(in, theta, (end - begin) * in->q.weight[i]);
+    }
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
+                           double phi_rad, weft_albedo_effort effort, double value[3])
+{
+    static const double decades[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 1, 2.5, 10, 100, 1e3, 1e4};
+    enum { N_DECADES = sizeof decades / sizeof decades[0], N_CUTS = N_DECADES + 4 };
+    integral in = {.fn = fn, .context = context, .domain = domain, .nv = nv};
+    assert(nv > 0 && nv <= 1);
+    weft_brdf_direction(nv, phi_rad, in.view);
+    in.sv = sqrt((1 - nv) * (1 + nv));
+    in.tangent[0] = cos(phi_rad);
+    in.tangent[1] = sin(phi_rad);
+    weft_quadrature_init(&in.q, effort == WEFT_ALBEDO_EXACT ? 16 : 8);
+    /* where the two horizons begin to cut the rings of half vectors, and where they have cut them off */
+    const double view_angle = atan2(in.sv, nv), half_pi = WEFT_PI / 2;
+    double cuts[N_CUTS] = {(half_pi - view_angle) / 2, (half_pi + view_angle) / 2, half_pi - view_angle,
+                           half_pi};
+    for (int i = 0; i < N_DECADES; i++)
+        cuts[4 + i] = atan(decades[i]);
+    qsort(cuts, N_CUTS, sizeof cuts[0], by_value);
+    for (int i = 0; i + 1 < N_CUTS; i++)
+        if (cuts[i] < cuts[i + 1])
+            add_interval(&in, cuts[i], cuts[i + 1]);
+    for (int c = 0; c < 3; c++)
+        value[c] = in.sum[c];
+}
+
+/* A model and its constant parameters spread over a batch. */
+typedef struct spread_model {
+    const weft_brdf *brdf;
+    double planes[WEFT_BRDF_MAX_PLANES][MAX_BATCH];
+} spread_model;
+
+static void spread(spread_model *model, const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES])
+{
+    model->brdf = brdf;
+    for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
+        for (int i = 0; i < MAX_BATCH; i++)
+            model->planes[k][i] = values[k];
+}
+
+static weft_brdf_batch with_params(const spread_model *model, const weft_brdf_batch *batch)
+{
+    weft_brdf_batch full = *batch;
+    for (int k = 0; k < weft_brdf_n_planes(model->brdf); k++)
+        full.param[k] = model->planes[k];
+    return full;
+}
+
+static void eval_model(void *context, const weft_brdf_batch *batch, double *const value[3])
+{
+    const spread_model *const model = context;
+    const weft_brdf_batch full = with_params(model, batch);
+    model->brdf->eval(&full, value);
+}
+
+static void eval_density(void *context, const weft_brdf_batch *batch, double *const value[3])
+{
+    const spread_model *const model = context;
+    const weft_brdf_batch full = with_params(model, batch);
+    model->brdf->pdf(&full, value[0]);
+    for (int i = 0; i < batch->n; i++)
+        value[1][i] = value[2][i] = 0;
+}
+
+void weft_brdf_albedo(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES], double nv,
+                      double phi_rad, weft_albedo_effort effort, double albedo[3])
+{
+    spread_model model;
+    spread(&model, brdf, values);
+    weft_albedo_integrate(eval_model, &model, WEFT_ALBEDO_UPPER, nv, phi_rad, effort, albedo);
+}
+
+double weft_brdf_pdf_integral(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES], double nv,
+                              double phi_rad, weft_albedo_effort effort)
+{
+    spread_model model;
+    double sum[3];
+    spread(&model, brdf, values);
+    weft_albedo_integrate(eval_density, &model, WEFT_ALBEDO_VISIBLE, nv, phi_rad, effort, sum);
+    return sum[0];
+}

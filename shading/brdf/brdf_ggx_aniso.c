@@ -1,0 +1,77 @@
+#include "shading/brdf/fresnel.h"
+#include "shading/brdf/sampling.h"
+
+#include "core/clones.h"
+
+#define ALPHA_FLOOR 0.001 /* of the bitangent at anisotropy 1 (S-ORD-06 trap b) */
+
+enum { F0 = 0, ALPHA = 3, ANISOTROPY = 4 }; /* first planes */
+
+static const weft_brdf_param params[] = {
+    {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
+    {"alpha", NULL, 1, 0.001, 1, 0.4, "", "roughness along the tangent, the width of the lobe"},
+    {"anisotropy", NULL, 1, 0, 1, 0.5, "",
+     "how much smoother the bitangent is: its roughness is alpha (1 - anisotropy)"},
+    {0},
+};
+
+/* f = D F V1(l) V1(v) with the widths alpha and alpha (1 - anisotropy), S-ORD-07. */
+WEFT_CLONES
+static void eval(const weft_brdf_batch *b, double *const value[3])
+{
+    const double *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
+    const double *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
+    const double *const fr = b->param[F0], *const fg = b->param[F0 + 1], *const fb = b->param[F0 + 2];
+    const double *const alpha = b->param[ALPHA], *const anisotropy = b->param[ANISOTROPY];
+    double *const r = value[0], *restrict const g = value[1], *restrict const bl = value[2];
+    WEFT_INDEPENDENT
+    for (int i = 0; i < b->n; i++) {
+        const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
+        const double at = alpha[i], ab = weft_ggx_alpha_b(at, anisotropy[i], ALPHA_FLOOR);
+        const double nl = h.valid > 0 ? h.nl : 1;
+        const double d = weft_ggx_d_aniso(h.h[0], h.h[1], h.nh, at, ab);
+        const double dv = h.valid > 0 ? d * weft_ggx_v1_aniso(lx[i], ly[i], nl, at, ab) *
+                                            weft_ggx_v1_aniso(vx[i], vy[i], h.nv, at, ab)
+                                      : 0;
+        const double w = weft_schlick_weight(h.lh);
+        r[i] = dv * (fr[i] + (1 - fr[i]) * w);
+        g[i] = dv * (fg[i] + (1 - fg[i]) * w);
+        bl[i] = dv * (fb[i] + (1 - fb[i]) * w);
+    }
+}
+
+static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
+{
+    for (int i = 0; i < b->n; i++) {
+        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, at = b->param[ALPHA][i];
+        double h[3], l[3];
+        weft_sample_ggx_visible(v, at, weft_ggx_alpha_b(at, b->param[ANISOTROPY][i], ALPHA_FLOOR), u[1][i],
+                                u[2][i], h);
+        weft_reflect(v, h, l);
+        for (int c = 0; c < 3; c++)
+            light[c][i] = l[c];
+    }
+}
+
+static void pdf(const weft_brdf_batch *b, double *density)
+{
+    for (int i = 0; i < b->n; i++) {
+        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, at = b->param[ALPHA][i];
+        const double ab = weft_ggx_alpha_b(at, b->param[ANISOTROPY][i], ALPHA_FLOOR);
+        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], v[0], v[1], v[2]);
+        density[i] = h.up > 0 ? weft_pdf_ggx_visible(weft_ggx_d_aniso(h.h[0], h.h[1], h.nh, at, ab),
+                                                     weft_ggx_v1_aniso(v[0], v[1], v[2], at, ab), v[2])
+                              : 0;
+    }
+}
+
+const weft_brdf weft_brdf_ggx_aniso = {
+    .name = "ggx-anisotropic",
+    .summary = "GGX with two widths, for yarns that lie one way: the specular lobe alone",
+    .source = "The Order: 1886 (Neubelt, Pettineo 2013) eqs. 11-14 after Burley; S-ORD-06, S-ORD-07",
+    .flags = WEFT_BRDF_RECIPROCAL | WEFT_BRDF_PASSIVE | WEFT_BRDF_ANISOTROPIC,
+    .params = params,
+    .eval = eval,
+    .sample = sample,
+    .pdf = pdf,
+};

@@ -1,0 +1,40 @@
+/** Terms of the Order's cloth model (S-ORD-14, S-ORD-15). */
+#ifndef WEFT_SHADING_BRDF_CLOTH_H
+#define WEFT_SHADING_BRDF_CLOTH_H
+
+#include "shading/brdf/exp_negative.h"
+#include "shading/brdf/half.h"
+
+/**
+ * The rim lobe, an inverted Gaussian: exp(-cot^2(theta_h)/alpha^2)/sin^4(theta_h).
+ *
+ * @param nh  n.h, 0..1
+ * @param s2  1 - nh^2; below 1e-7 the exponential has won and the lobe is 0 (S-CNV-02)
+ */
+static inline double weft_cloth_rim(double nh, double s2, double alpha)
+{
+    const double safe = s2 < 1e-7 ? 1 : s2;
+    const double rim = weft_exp_negative(-nh * nh / (alpha * alpha * safe)) / (safe * safe);
+    return s2 < 1e-7 ? 0 : rim;
+}
+
+/**
+ * Cloth distribution, in 1/sr; the integral of D (n.h) over the hemisphere is 1.
+ *
+ *     D = (1 + A rim) / (pi (1 + A alpha^2))
+ *
+ * @param amplitude  A >= 0, the weight of the rim lobe against the constant offset; the Order uses 4
+ * D(0) = 1/(pi(1 + A alpha^2)), D(90 deg) = (1 + A)/(pi(1 + A alpha^2)).  Source: S-ORD-14.
+ */
+static inline double weft_cloth_d(double nh, double s2, double alpha, double amplitude)
+{
+    return (1 + amplitude * weft_cloth_rim(nh, s2, alpha)) / (WEFT_PI * (1 + amplitude * alpha * alpha));
+}
+
+/** 1/(4 (nl + nv - nl nv)) in place of G/(4 nl nv): no shadowing term.  nl, nv > 0.  Source: S-ORD-15. */
+static inline double weft_cloth_v(double nl, double nv)
+{
+    return 0.25 / (nl + nv - nl * nv);
+}
+
+#endif

@@ -1,0 +1,374 @@
+/* Every model of the table against what it promises, and against numbers from elsewhere. */
+#include "tests/support/support.h"
+
+#include "shading/brdf/albedo.h"
+#include "shading/brdf/half.h"
+#include "shading/brdf/sampling.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define SEED 20261123u
+
+static double between(uint64_t *random, double min, double max)
+{
+    return min + (max - min) * weft_test_random(random);
+}
+
+static void random_direction(uint64_t *random, double min_cosine, double direction[3])
+{
+    weft_brdf_direction(between(random, min_cosine, 1), between(random, -WEFT_PI, WEFT_PI), direction);
+}
+
+/* Each parameter somewhere in its range, often at an end of it. */
+static void random_values(const weft_brdf *brdf, uint64_t *random, double values[WEFT_BRDF_MAX_PLANES])
+{
+    int plane = 0;
+    for (const weft_brdf_param *p = brdf->params; p->name; p++)
+        for (int c = 0; c < p->components; c++) {
+            const double choice = weft_test_random(random);
+            values[plane++] = choice < 0.1 ? p->min : choice < 0.2 ? p->max : between(random, p->min, p->max);
+        }
+}
+
+static void test_table_is_sound(void **state)
+{
+    (void)state;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        const weft_brdf *const brdf = *b;
+        const weft_brdf *found = NULL;
+        assert_ok(weft_brdf_find(brdf->name, &found, err));
+        assert_ptr_equal(found, brdf); /* names are unique */
+        assert_true(weft_brdf_n_planes(brdf) <= WEFT_BRDF_MAX_PLANES);
+        assert_true(brdf->summary && brdf->source && brdf->eval && brdf->params);
+        assert_int_equal(brdf->sample == NULL, brdf->pdf == NULL);
+        for (const weft_brdf_param *p = brdf->params; p->name; p++) {
+            assert_true(p->components == 1 || p->components == 3);
+            assert_true(p->min < p->max && p->def >= p->min && p->def <= p->max && p->unit && p->help);
+        }
+    }
+}
+
+static void check_value(const weft_brdf *brdf, const double values[], const double l[3], const double v[3])
+{
+    double f[3];
+    weft_brdf_eval_one(brdf, values, l, v, f);
+    for (int c = 0; c < 3; c++)
+        if (!isfinite(f[c]) || f[c] < 0 || (l[2] <= 0 && f[c] != 0))
+            fail_msg("%s is %g at l %.17g %.17g %.17g, v %.17g %.17g %.17g", brdf->name, f[c], l[0], l[1],
+                     l[2], v[0], v[1], v[2]);
+}
+
+static void test_values_are_finite_and_not_negative(void **state)
+{
+    (void)state;
+    static const double cosines[] = {1, 0.999999999999, 0.5, 1e-3, 1e-9, 1e-300, 0, -1e-9, -0.5, -1};
+    enum { N = sizeof cosines / sizeof cosines[0] };
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double values[WEFT_BRDF_MAX_PLANES], l[3], v[3];
+        for (int i = 0; i < 20000; i++) {
+            random_values(*b, &random, values);
+            random_direction(&random, -1, l);
+            random_direction(&random, -1, v);
+            check_value(*b, values, l, v);
+            check_value(*b, values, l, l); /* retro */
+            const double opposite[3] = {-l[0], -l[1], -l[2]}, mirror[3] = {-l[0], -l[1], l[2]};
+            check_value(*b, values, l, opposite);
+            check_value(*b, values, l, mirror);
+        }
+        for (int i = 0; i < N * N * 4; i++) {
+            random_values(*b, &random, values);
+            weft_brdf_direction(cosines[i % N], 0, l);
+            weft_brdf_direction(cosines[i / N % N], i / (N * N) * WEFT_PI / 3, v);
+            check_value(*b, values, l, v);
+        }
+    }
+}
+
+static void test_reciprocity(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double worst = 0;
+        for (int i = 0; i < 5000; i++) {
+            double values[WEFT_BRDF_MAX_PLANES], l[3], v[3], there[3], back[3];
+            random_values(*b, &random, values);
+            random_direction(&random, 1e-4, l);
+            random_direction(&random, 1e-4, v);
+            weft_brdf_eval_one(*b, values, l, v, there);
+            weft_brdf_eval_one(*b, values, v, l, back);
+            for (int c = 0; c < 3; c++)
+                if (there[c] > 0)
+                    worst = fmax(worst, fabs(back[c] / there[c] - 1));
+        }
+        if ((*b)->flags & WEFT_BRDF_RECIPROCAL)
+            assert_near(worst, 0, 1e-12);
+        else if (worst < 1e-6)
+            fail_msg("%s is reciprocal and does not say so", (*b)->name);
+    }
+}
+
+/* Loops of every length must give what single evaluations give, to the bit. */
+static void test_arrays_give_what_single_evaluations_give(void **state)
+{
+    (void)state;
+    enum { N = 37 };
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double l[3][N], v[3][N], f[3][N + 1], params[WEFT_BRDF_MAX_PLANES][N], single[N][3];
+        for (int i = 0; i < N; i++) {
+            double values[WEFT_BRDF_MAX_PLANES], light[3], view[3];
+            random_values(*b, &random, values);
+            random_direction(&random, -0.2, light);
+            random_direction(&random, -0.2, view);
+            weft_brdf_eval_one(*b, values, light, view, single[i]);
+            for (int c = 0; c < 3; c++) {
+                l[c][i] = light[c];
+                v[c][i] = view[c];
+            }
+            for (int k = 0; k < weft_brdf_n_planes(*b); k++)
+                params[k][i] = values[k];
+        }
+        for (int n = 0; n <= N; n++) {
+            weft_brdf_batch batch = {.n = n, .light = {l[0], l[1], l[2]}, .view = {v[0], v[1], v[2]}};
+            double *const out[3] = {f[0], f[1], f[2]};
+            for (int k = 0; k < weft_brdf_n_planes(*b); k++)
+                batch.param[k] = params[k];
+            f[0][n] = f[1][n] = f[2][n] = -7;
+            (*b)->eval(&batch, out);
+            for (int c = 0; c < 3; c++) {
+                for (int i = 0; i < n; i++)
+                    assert_true(f[c][i] == single[i][c]);
+                assert_true(f[c][n] == -7);
+            }
+        }
+    }
+}
+
+/* White furnace: nothing comes back that did not go in. */
+static void test_furnace(void **state)
+{
+    (void)state;
+    static const double f0s[] = {0, 0.04, 0.5, 1}, widths[] = {0, 0.01, 0.05, 0.2, 0.5, 1};
+    static const double cosines[] = {0.01, 0.1, 0.3, 0.6, 1};
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double highest = 0;
+        for (int i = 0; i < 4 * 6 * 5; i++) {
+            double values[WEFT_BRDF_MAX_PLANES], albedo[3];
+            int plane = 0;
+            for (const weft_brdf_param *p = (*b)->params; p->name; p++) {
+                const double share = widths[i / 4 % 6], value = p->min + share * (p->max - p->min);
+                for (int c = 0; c < p->components; c++) /* colours: white, coats as listed */
+                    values[plane++] = p->components == 1           ? value
+                                      : strcmp(p->name, "f0") == 0 ? f0s[i % 4]
+                                                                   : p->max;
+            }
+            weft_brdf_albedo(*b, values, cosines[i / 24], 0.4, WEFT_ALBEDO_QUICK, albedo);
+            highest = fmax(highest, albedo[0]);
+        }
+        print_message("  %-18s highest albedo %.6f\n", (*b)->name, highest);
+        if ((*b)->flags & WEFT_BRDF_PASSIVE)
+            assert_true(highest <= 1 + 1e-6);
+        else
+            assert_true(highest > 1.01); /* or it should promise to be passive */
+    }
+}
+
+static void test_density_integrates_to_one(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double worst = 0;
+        for (int i = 0; i < 20 && (*b)->pdf; i++) {
+            double values[WEFT_BRDF_MAX_PLANES];
+            random_values(*b, &random, values);
+            const double nv = i == 0 ? 1 : between(&random, 0.02, 1);
+            const double total =
+                weft_brdf_pdf_integral(*b, values, nv, between(&random, -3, 3), WEFT_ALBEDO_QUICK);
+            worst = fmax(worst, fabs(total - 1));
+        }
+        print_message("  %-18s largest |integral of pdf - 1| %.2e\n", (*b)->name, worst);
+        /* two widths a thousand apart turn faster than the quadrature looks */
+        assert_near(worst, 0, (*b)->flags & WEFT_BRDF_ANISOTROPIC ? 1e-3 : 1e-9);
+    }
+}
+
+enum { RINGS = 24, SECTORS = 24, SAMPLES = 100000, SUB = 12 };
+
+/* Probability of each cell of the sphere (n.l by azimuth) by midpoints. */
+static void expected_cells(const weft_brdf *brdf, const double values[], const double v[3],
+                           double expected[RINGS][SECTORS])
+{
+    for (int ring = 0; ring < RINGS; ring++)
+        for (int sector = 0; sector < SECTORS; sector++) {
+            double light[3][SUB * SUB], view[3][SUB * SUB], density[SUB * SUB], sum = 0;
+            double params[WEFT_BRDF_MAX_PLANES][SUB * SUB];
+            weft_brdf_batch batch = {
+                .n = SUB * SUB, .light = {light[0], light[1], light[2]}, .view = {view[0], view[1], view[2]}};
+            for (int i = 0; i < SUB * SUB; i++) {
+                double l[3];
+                const double cosine = -1 + 2.0 * (ring + (i / SUB + 0.5) / SUB) / RINGS;
+                weft_brdf_direction(cosine, 2 * WEFT_PI * (sector + (i % SUB + 0.5) / SUB) / SECTORS, l);
+                for (int c = 0; c < 3; c++) {
+                    light[c][i] = l[c];
+                    view[c][i] = v[c];
+                }
+                for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
+                    params[k][i] = values[k];
+            }
+            for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
+                batch.param[k] = params[k];
+            brdf->pdf(&batch, density);
+            for (int i = 0; i < SUB * SUB; i++)
+                sum += density[i];
+            expected[ring][sector] = SAMPLES * sum * 4 * WEFT_PI / (RINGS * SECTORS * SUB * SUB);
+        }
+}
+
+static void count_cells(const weft_brdf *brdf, const double values[], const double v[3], uint64_t *random,
+                        double counted[RINGS][SECTORS])
+{
+    memset(counted, 0, sizeof(double[RINGS][SECTORS]));
+    for (int i = 0; i < SAMPLES; i++) {
+        double u[3], l[3];
+        const double *const uniform[3] = {&u[0], &u[1], &u[2]};
+        double *const light[3] = {&l[0], &l[1], &l[2]};
+        weft_brdf_batch batch = {.n = 1, .view = {&v[0], &v[1], &v[2]}};
+        for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
+            batch.param[k] = &values[k];
+        for (int c = 0; c < 3; c++)
+            u[c] = weft_test_random(random);
+        brdf->sample(&batch, uniform, light);
+        assert_near(l[0] * l[0] + l[1] * l[1] + l[2] * l[2], 1, 1e-9);
+        const double phi = atan2(l[1], l[0]);
+        const int ring = (int)fmin((l[2] + 1) / 2 * RINGS, RINGS - 1);
+        const int sector =
+            (int)fmin((phi < 0 ? phi + 2 * WEFT_PI : phi) / (2 * WEFT_PI) * SECTORS, SECTORS - 1);
+        counted[ring < 0 ? 0 : ring][sector]++;
+    }
+}
+
+/* Chi-square in units of its own scatter: (X - cells)/sqrt(2 cells); cells below 5 go into one. */
+static double chi_square_score(double expected[RINGS][SECTORS], double counted[RINGS][SECTORS])
+{
+    double sum = 0, rare_expected = 0, rare_counted = 0;
+    int cells = 0;
+    for (int ring = 0; ring < RINGS; ring++)
+        for (int sector = 0; sector < SECTORS; sector++) {
+            const double e = expected[ring][sector], o = counted[ring][sector];
+            if (e < 5) {
+                rare_expected += e;
+                rare_counted += o;
+            } else {
+                sum += (o - e) * (o - e) / e;
+                cells++;
+            }
+        }
+    if (rare_expected >= 5) {
+        sum += (rare_counted - rare_expected) * (rare_counted - rare_expected) / rare_expected;
+        cells++;
+    } else if (rare_counted > 30) {
+        return 1e9; /* samples where the density says there are none */
+    }
+    return (sum - (cells - 1)) / sqrt(2.0 * (cells - 1));
+}
+
+static void test_samples_follow_the_density(void **state)
+{
+    (void)state;
+    static const double views[][2] = {{0.95, 0.3}, {0.5, 2.0}, {0.15, -1.0}};
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++)
+        for (int i = 0; i < 3 && (*b)->sample; i++) {
+            double values[WEFT_BRDF_MAX_PLANES], v[3], wrong[3];
+            static double expected[RINGS][SECTORS], counted[RINGS][SECTORS];
+            weft_brdf_defaults(*b, values);
+            weft_brdf_direction(views[i][0], views[i][1], v);
+            weft_brdf_direction(views[i][0] - 0.1, views[i][1] + 0.2, wrong);
+            expected_cells(*b, values, v, expected);
+            count_cells(*b, values, v, &random, counted);
+            const double score = chi_square_score(expected, counted);
+            if (score > 5)
+                fail_msg("%s, view %d: chi-square is %.1f sigma above (seed %u)", (*b)->name, i, score, SEED);
+            count_cells(*b, values, wrong, &random, counted); /* the test must see a lobe that is off */
+            const double score_wrong = chi_square_score(expected, counted);
+            print_message("  %-18s view %d: chi-square %+.1f sigma, of a view 0.1 off %+.1f\n", (*b)->name, i,
+                          score, score_wrong);
+            if ((*b)->sample != weft_brdf_sample_cosine)
+                assert_true(score_wrong > 10);
+        }
+}
+
+static double albedo_of(const char *name, const char *const *settings, double nv)
+{
+    const weft_brdf *brdf = NULL;
+    double values[WEFT_BRDF_MAX_PLANES], albedo[3];
+    assert_ok(weft_brdf_find(name, &brdf, err));
+    weft_brdf_defaults(brdf, values);
+    for (; *settings; settings++)
+        assert_ok(weft_brdf_set(brdf, *settings, values, err));
+    weft_brdf_albedo(brdf, values, nv, 0, WEFT_ALBEDO_EXACT, albedo);
+    return albedo[0];
+}
+
+/* Closed forms, and the figures that the specification found by other means (four digits). */
+static void test_albedos_known_from_elsewhere(void **state)
+{
+    (void)state;
+    const char *const none[] = {NULL}, *const white[] = {"f0=1", "alpha=1", NULL};
+    const char *const rough[] = {"albedo=1", "f0=0.04", "alpha=0.5", NULL};
+    const char *const smooth[] = {"albedo=1", "f0=0.04", "alpha=0.01", NULL};
+    const char *const round[] = {"f0=1", "alpha=0.5", "anisotropy=0", NULL};
+    const char *const coat[] = {"albedo=0.7", "f0=0.1", NULL};
+    assert_near(albedo_of("lambert", none, 0.3), 0.5, 1e-10);
+    assert_near(albedo_of("ggx-specular", white, 1), 1 - log(2), 1e-10);
+    assert_near(albedo_of("lambert-coupled", coat, 0.3), 0.7 * 0.9 * (1 - pow(0.7, 5)), 1e-10);
+    assert_near(albedo_of("ggx-anisotropic", round, 0.5), 0.6860, 5e-5); /* S-ORD-05 */
+    assert_near(albedo_of("ggx", rough, 0.01), 1.025, 5e-4);             /* S-ORD-08 */
+    assert_near(albedo_of("ggx", rough, 1), 0.987, 5e-4);
+    assert_near(albedo_of("ggx", smooth, 0.01), 1.696, 5e-4);
+    assert_near(albedo_of("ggx", smooth, 0.5), 1.025, 5e-4);
+}
+
+static void test_parameters_are_set_by_name(void **state)
+{
+    (void)state;
+    const weft_brdf *brdf = NULL;
+    double values[WEFT_BRDF_MAX_PLANES];
+    assert_ok(weft_brdf_find("ggx", &brdf, err));
+    weft_brdf_defaults(brdf, values);
+    assert_ok(weft_brdf_set(brdf, "f0=0.9,0.6,0.3", values, err));
+    assert_ok(weft_brdf_set(brdf, "cdiff=0.25", values, err));
+    assert_ok(weft_brdf_set(brdf, "alpha=0.125", values, err));
+    const double wanted[] = {0.25, 0.25, 0.25, 0.9, 0.6, 0.3, 0.125};
+    assert_memory_equal(values, wanted, sizeof wanted);
+    assert_fails(weft_brdf_find("gx", &brdf, err), WEFT_ERR_USAGE, "lambert, ");
+    assert_fails(weft_brdf_set(brdf, "alpha", values, err), WEFT_ERR_USAGE, "NAME=VALUE");
+    assert_fails(weft_brdf_set(brdf, "roughness=1", values, err), WEFT_ERR_USAGE, "it has albedo, f0, alpha");
+    assert_fails(weft_brdf_set(brdf, "alpha=2", values, err), WEFT_ERR_USAGE, "wanted 0.001 to 1");
+    assert_fails(weft_brdf_set(brdf, "alpha=nan", values, err), WEFT_ERR_USAGE, "a number");
+    assert_fails(weft_brdf_set(brdf, "alpha=0.1,0.2", values, err), WEFT_ERR_USAGE, "too many");
+    assert_fails(weft_brdf_set(brdf, "f0=0.1,0.2", values, err), WEFT_ERR_USAGE, "one number or 3");
+    assert_fails(weft_brdf_set(brdf, "f0=0.1,0.2,0.3,0.4", values, err), WEFT_ERR_USAGE, "too many");
+    assert_memory_equal(values, wanted, sizeof wanted);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_table_is_sound),
+        cmocka_unit_test(test_values_are_finite_and_not_negative),
+        cmocka_unit_test(test_reciprocity),
+        cmocka_unit_test(test_arrays_give_what_single_evaluations_give),
+        cmocka_unit_test(test_furnace),
+        cmocka_unit_test(test_density_integrates_to_one),
+        cmocka_unit_test(test_samples_follow_the_density),
+        cmocka_unit_test(test_albedos_known_from_elsewhere),
+        cmocka_unit_test(test_parameters_are_set_by_name),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
