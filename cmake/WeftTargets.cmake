@@ -14,6 +14,11 @@ if(WEFT_SANITIZE)
   target_link_options(weft_options INTERFACE -fsanitize=address,undefined)
 endif()
 
+if(WEFT_FUZZ)
+  target_compile_options(weft_options INTERFACE -fsanitize=fuzzer-no-link,address,undefined -fno-omit-frame-pointer)
+  target_link_options(weft_options INTERFACE -fsanitize=address,undefined)
+endif()
+
 # weft_library(NAME SOURCES a.c b.c [LIBS x y])
 function(weft_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})

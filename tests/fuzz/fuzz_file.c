@@ -1,0 +1,66 @@
+/*
+ * libFuzzer over every reader of files.  One program per reader, chosen by WEFT_FUZZ_READER; the bytes go
+ * through a memory file, so that the real reader opens a real path.  A crash, a sanitizer report or a
+ * read that never ends is a defect; an error is what damaged bytes are supposed to give.
+ */
+#include "core/formats/exr_file.h"
+#include "core/formats/png_file.h"
+#include "core/formats/raw_file.h"
+#include "core/formats/tiff_file.h"
+#include "core/mem.h"
+
+#include <stdint.h>
+#include <stdio.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+static void read_png(const char *path)
+{
+    weft_raster raster;
+    if (weft_png_read(path, &raster, NULL) == WEFT_OK)
+        weft_raster_fini(&raster);
+}
+
+static void read_tiff(const char *path)
+{
+    weft_raster raster;
+    if (weft_tiff_read(path, &raster, NULL) == WEFT_OK)
+        weft_raster_fini(&raster);
+}
+
+static void read_exr(const char *path)
+{
+    static const char *const names[] = {"X|R|Y", "Y|G", "Z|B"};
+    weft_image image;
+    char *channels;
+    if (weft_exr_read(path, names, 1, &image, NULL) == WEFT_OK)
+        weft_image_fini(&image);
+    if (weft_exr_read(path, names, 3, &image, NULL) == WEFT_OK)
+        weft_image_fini(&image);
+    if (weft_exr_channels(path, &channels, NULL) == WEFT_OK)
+        weft_free(channels);
+}
+
+static void read_raw(const char *path)
+{
+    weft_mosaic mosaic;
+    weft_frame_info info;
+    if (weft_raw_read(path, &mosaic, &info, NULL) == WEFT_OK)
+        weft_mosaic_fini(&mosaic);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n);
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n)
+{
+    char path[64];
+    const int fd = memfd_create("input", 0);
+    if (fd < 0 || write(fd, bytes, n) != (ssize_t)n) {
+        perror("memfd");
+        return 1;
+    }
+    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    WEFT_FUZZ_READER(path);
+    close(fd);
+    return 0;
+}

@@ -1,0 +1,93 @@
+/* fuzz_seeds FOLDER: writes small valid files for the fuzzers to start from: FOLDER/png/..., tiff, exr, raw.
+ */
+#include "core/file.h"
+#include "core/formats/exr_file.h"
+#include "core/formats/png_file.h"
+#include "core/formats/tiff_file.h"
+#include "core/log.h"
+#include "core/mem.h"
+
+#include <stdio.h>
+
+static weft_err seed_path(const char *folder, const char *reader, const char *name, char path[1024],
+                          weft_error *err)
+{
+    snprintf(path, 1024, "%s/%s", folder, reader);
+    WEFT_TRY(weft_folder_create(path, err));
+    snprintf(path, 1024, "%s/%s/%s", folder, reader, name);
+    return WEFT_OK;
+}
+
+static weft_err write_rasters(const char *folder, weft_error *err)
+{
+    for (int channels = 1; channels <= 3; channels += 2)
+        for (int bits = 8; bits <= 16; bits += 8) {
+            char path[1024], name[32];
+            weft_raster raster;
+            WEFT_TRY(weft_raster_init(&raster, 9, 7, channels, bits, err));
+            for (int i = 0; i < 9 * 7 * channels; i++)
+                raster.data[i] = (uint16_t)(i * 3);
+            snprintf(name, sizeof name, "%d-%d", channels, bits);
+            weft_err status = seed_path(folder, "png", name, path, err);
+            if (status == WEFT_OK)
+                status = weft_png_write(path, &raster, err);
+            if (status == WEFT_OK)
+                status = seed_path(folder, "tiff", name, path, err);
+            if (status == WEFT_OK)
+                status = weft_tiff_write(path, &raster, err);
+            weft_raster_fini(&raster);
+            WEFT_TRY(status);
+        }
+    return WEFT_OK;
+}
+
+static weft_err write_exrs(const char *folder, weft_error *err)
+{
+    static const char *const names[] = {"R", "G", "B"};
+    weft_image image;
+    char path[1024];
+    WEFT_TRY(weft_image_init(&image, 9, 7, 3, err));
+    for (int i = 0; i < 9 * 7 * 3; i++)
+        image.data[i] = (float)i;
+    weft_err status = seed_path(folder, "exr", "half", path, err);
+    if (status == WEFT_OK)
+        status = weft_exr_write(path, &image, names, WEFT_EXR_HALF, err);
+    if (status == WEFT_OK)
+        status = seed_path(folder, "exr", "float", path, err);
+    if (status == WEFT_OK)
+        status = weft_exr_write(path, &image, names, WEFT_EXR_FLOAT, err);
+    weft_image_fini(&image);
+    return status;
+}
+
+static weft_err write_raws(const char *folder, weft_error *err)
+{
+    weft_mosaic mosaic;
+    char path[1024];
+    WEFT_TRY(weft_mosaic_init(&mosaic, 32, 24, WEFT_CFA_RGGB, err));
+    for (int i = 0; i < 32 * 24; i++)
+        mosaic.data[i] = (uint16_t)(256 + i);
+    const weft_frame_info info = {.exposure_s = 0.04, .gain = 1, .make = "Weft", .model = "seed"};
+    weft_err status = seed_path(folder, "raw", "dng", path, err);
+    if (status == WEFT_OK)
+        status = weft_dng_write(path, &mosaic, &info, err);
+    weft_mosaic_fini(&mosaic);
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    weft_error error = {0};
+    if (argc != 2) {
+        fputs("usage: fuzz_seeds FOLDER\n", stderr);
+        return 2;
+    }
+    weft_err status = write_rasters(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_exrs(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_raws(argv[1], &error);
+    if (status != WEFT_OK)
+        weft_log_error("%s", error.text);
+    return weft_err_exit_status(status);
+}
