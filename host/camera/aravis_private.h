@@ -1,0 +1,51 @@
+/** Inside the Aravis backend: the state that cam_aravis.c (settings) and aravis_stream.c (frames) share. */
+#ifndef WEFT_HOST_CAMERA_ARAVIS_PRIVATE_H
+#define WEFT_HOST_CAMERA_ARAVIS_PRIVATE_H
+
+#include "host/camera/aravis_formats.h"
+#include "host/camera/camera.h"
+
+#include <arv.h>
+#include <stdatomic.h>
+
+typedef struct aravis_camera {
+    ArvCamera *camera;
+    ArvDevice *device; /* borrowed from `camera` */
+    ArvStream *stream; /* NULL: no stream runs */
+    char address[120]; /* as given; names the camera in messages */
+    bool loopback;     /* GigE Vision on 127.x.x.x */
+    bool stale;        /* a frame may still come for a trigger that was given up: start a new stream */
+    bool has_gain;
+    weft_gain_scale gain_scale;
+    double gain_unit;
+    weft_raw_format format;
+    ArvPixelFormat code;
+    weft_camera_state *info; /* the caller's, filled by open and configure */
+    double exposure_min_s, exposure_max_s;
+    weft_camera_settings set; /* what the frames have, as read back */
+    atomic_bool lost;         /* from Aravis' heartbeat thread */
+} aravis_camera;
+
+/** Fills `err` from a GError (which it frees): "camera ADDRESS: DOING: ..." with what to do. */
+weft_err aravis_fail(const aravis_camera *a, GError *error, const char *doing, weft_error *err);
+
+/** Calls an Aravis function (its last argument must be &error) and returns from the caller on failure. */
+#define ARAVIS_TRY(a, doing, call)                                                                           \
+    do {                                                                                                     \
+        GError *error = NULL;                                                                                \
+        call;                                                                                                \
+        if (error)                                                                                           \
+            return aravis_fail(a, error, doing, err);                                                        \
+    } while (0)
+
+/** Writes the exposure to the device and reads back what it made of it. */
+weft_err aravis_set_exposure(const aravis_camera *a, double exposure_s, double *achieved_s, weft_error *err);
+
+/** The `expose` of the backend. */
+weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle, void *idle_context,
+                       weft_captured_frame *frame, weft_error *err);
+
+/** Stops the stream, if one runs; a camera that is gone is not asked. */
+void aravis_stop(aravis_camera *a);
+
+#endif

@@ -1,0 +1,284 @@
+/* Frames of GigE Vision and USB3 Vision cameras: stream, trigger, wait. */
+#include "host/camera/aravis_private.h"
+
+#include "core/log.h"
+#include "core/progress.h"
+
+#include <arpa/inet.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+enum {
+    N_BUFFERS = 4,
+    SLICE_US = 50000, /* between two calls of `idle` */
+};
+
+#define GVCP_PORT 3956
+/* How long a silent camera is asked whether it lives, ending with the deadline. */
+#define PING_S     1.2
+#define PING_TRIES 3
+/* The first frame of a stream has taken up to 0.3 s on loopback, and half a second on sleeping cameras. */
+#define FIRST_FRAME_S 3.0
+
+void aravis_stop(aravis_camera *a)
+{
+    if (a->stream && !atomic_load(&a->lost))
+        arv_camera_stop_acquisition(a->camera, NULL); /* a camera that does not answer is stopped already */
+    g_clear_object(&a->stream);
+    a->stale = false;
+}
+
+static weft_err set_packet_size(aravis_camera *a, weft_error *err)
+{
+    if (!arv_camera_is_gv_device(a->camera))
+        return WEFT_OK;
+    if (a->loopback) {
+        /* A packet of 9 kB is charged 16 kB of socket memory; the largest there are lose nothing. */
+        enum { LOOPBACK_BYTES = 65000 };
+        arv_camera_gv_set_packet_size_adjustment(a->camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
+        arv_camera_gv_set_stream_options(a->camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+        ARAVIS_TRY(a, "setting the packet size",
+                   arv_camera_gv_set_packet_size(a->camera, LOOPBACK_BYTES, &error));
+        return WEFT_OK;
+    }
+    guint bytes = 0;
+    ARAVIS_TRY(a, "finding the largest packet that passes",
+               bytes = arv_camera_gv_auto_packet_size(a->camera, &error));
+    if (bytes < 8000)
+        weft_explain("camera %s: packets of %u bytes; an MTU of 9000 on this network lowers the load",
+                     a->address, bytes);
+    return WEFT_OK;
+}
+
+static weft_err create_stream(aravis_camera *a, weft_error *err)
+{
+    guint payload = 0;
+    WEFT_TRY(set_packet_size(a, err));
+    ARAVIS_TRY(a, "asking the size of a frame", payload = arv_camera_get_payload(a->camera, &error));
+    ARAVIS_TRY(a, "opening the stream", a->stream = arv_camera_create_stream(a->camera, NULL, NULL, &error));
+    if (!a->stream)
+        return aravis_fail(a, NULL, "opening the stream", err);
+    if (ARV_IS_GV_STREAM(a->stream)) {
+        /* Two frames, but never little: Aravis' own choice for a frame of one packet loses that packet. */
+        enum { LEAST = 4 << 20, MOST = 256 << 20 };
+        const gint bytes = payload > MOST / 2 ? MOST : payload > LEAST / 2 ? (gint)(2 * payload) : LEAST;
+        g_object_set(a->stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+                     bytes, "packet-resend",
+                     a->loopback ? ARV_GV_STREAM_PACKET_RESEND_NEVER : ARV_GV_STREAM_PACKET_RESEND_ALWAYS,
+                     NULL);
+    }
+    for (int i = 0; i < N_BUFFERS; i++)
+        arv_stream_push_buffer(a->stream, arv_buffer_new_allocate(payload));
+    return WEFT_OK;
+}
+
+static weft_err check_there(const aravis_camera *a, weft_error *err)
+{
+    if (atomic_load(&a->lost))
+        return weft_fail(err, WEFT_ERR_DEVICE,
+                         "camera %s: the connection was lost; check its cable and power, and that no other "
+                         "program has taken it over",
+                         a->address);
+    return WEFT_OK;
+}
+
+/* Whether a GigE Vision camera answers a READREG (GigE Vision 2.0, section 17) on a socket of our own:
+ * Aravis' own reads stand in line behind its heartbeat, which waits for seconds when the camera is gone. */
+static bool answers(const char *address)
+{
+    static const uint8_t read_privilege[12] = {0x42, 0x01, 0x00, 0x80, 0x00, 0x04, 0x77, 0x65, 0, 0, 0x0a, 0};
+    const struct sockaddr_in to = {
+        .sin_family = AF_INET, .sin_port = htons(GVCP_PORT), .sin_addr.s_addr = inet_addr(address)};
+    const struct timeval wait = {.tv_usec = (suseconds_t)(1e6 * PING_S / PING_TRIES)};
+    uint8_t reply[64];
+    bool answered = false;
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (fd < 0 || connect(fd, (const struct sockaddr *)&to, sizeof to) != 0 ||
+        setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait) != 0)
+        answered = true; /* nothing is known: let the deadline decide */
+    for (int i = 0; i < PING_TRIES && !answered; i++)
+        answered = send(fd, read_privilege, sizeof read_privilege, 0) > 0 &&
+                   recv(fd, reply, sizeof reply, 0) >= 8 && reply[2] == 0 && reply[3] == 0x81;
+    if (fd >= 0)
+        close(fd);
+    return answered;
+}
+
+static weft_err ping(aravis_camera *a, weft_error *err)
+{
+    struct in_addr unused;
+    if (inet_pton(AF_INET, a->address, &unused) == 1) {
+        if (!answers(a->address))
+            atomic_store(&a->lost, true);
+        return check_there(a, err);
+    }
+    ARAVIS_TRY(a, "waiting for a frame", (void)arv_camera_get_pixel_format(a->camera, &error));
+    return WEFT_OK;
+}
+
+/* Triggers and waits at most wait_s for whatever comes; *buffer is NULL when nothing did.  A silent camera
+ * is asked whether it lives early enough for the answer to come before the deadline. */
+static weft_err take(aravis_camera *a, double wait_s, weft_camera_idle_fn *idle, void *idle_context,
+                     ArvBuffer **buffer, weft_error *err)
+{
+    ArvBuffer *old;
+    *buffer = NULL;
+    while ((old = arv_stream_try_pop_buffer(a->stream)) != NULL)
+        arv_stream_push_buffer(a->stream, old);
+    WEFT_TRY(check_there(a, err));
+    a->stale = true;
+    ARAVIS_TRY(a, "triggering a frame", arv_camera_software_trigger(a->camera, &error));
+
+    const double start_s = weft_clock_s(), ping_after_s = wait_s - PING_S;
+    bool pinged = ping_after_s < a->set.exposure_s + PING_S; /* no time for it: a short deadline is enough */
+    for (double elapsed_s = 0; !*buffer && elapsed_s < wait_s; elapsed_s = weft_clock_s() - start_s) {
+        *buffer = arv_stream_timeout_pop_buffer(a->stream, SLICE_US);
+        if (*buffer)
+            break;
+        WEFT_TRY(check_there(a, err));
+        if (idle)
+            WEFT_TRY(idle(idle_context, err));
+        if (!pinged && elapsed_s > ping_after_s) {
+            WEFT_TRY(ping(a, err));
+            pinged = true;
+        }
+    }
+    a->stale = !*buffer;
+    return WEFT_OK;
+}
+
+/* The socket buffer grows only when the first frame's leader has come, so the first frame often lacks
+ * packets: take one with the shortest exposure and forget it. */
+static weft_err throw_one_away(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context,
+                               weft_error *err)
+{
+    ArvBuffer *buffer = NULL;
+    double achieved_s;
+    WEFT_TRY(aravis_set_exposure(a, a->exposure_min_s, &achieved_s, err));
+    WEFT_TRY(take(a, FIRST_FRAME_S, idle, idle_context, &buffer, err));
+    if (buffer)
+        arv_stream_push_buffer(a->stream, buffer);
+    return aravis_set_exposure(a, a->set.exposure_s, &achieved_s, err);
+}
+
+static weft_err start(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context, weft_error *err)
+{
+    enum { TRIES = 2 };
+    for (int i = 0; i < TRIES; i++) {
+        WEFT_TRY(create_stream(a, err));
+        ARAVIS_TRY(a, "starting the stream", arv_camera_start_acquisition(a->camera, &error));
+        WEFT_TRY(throw_one_away(a, idle, idle_context, err));
+        if (!a->stale)
+            return WEFT_OK;
+        aravis_stop(a);
+    }
+    return weft_fail(
+        err, WEFT_ERR_TIMEOUT,
+        "camera %s: answers, but none of its frames arrives; let a firewall pass UDP from it, and "
+        "check that it has an address of this network",
+        a->address);
+}
+
+static const char *status_words(ArvBufferStatus status)
+{
+    switch (status) {
+    case ARV_BUFFER_STATUS_TIMEOUT:
+        return "its last packets did not come";
+    case ARV_BUFFER_STATUS_MISSING_PACKETS:
+        return "packets were lost";
+    case ARV_BUFFER_STATUS_WRONG_PACKET_ID:
+        return "packets came with wrong numbers";
+    case ARV_BUFFER_STATUS_SIZE_MISMATCH:
+        return "it is larger than agreed";
+    case ARV_BUFFER_STATUS_ABORTED:
+        return "the stream was stopped";
+    default:
+        return "it was not filled";
+    }
+}
+
+static uint64_t missing_packets(const aravis_camera *a)
+{
+    guint64 resent = 0, missing = 0;
+    if (ARV_IS_GV_STREAM(a->stream))
+        arv_gv_stream_get_statistics(ARV_GV_STREAM(a->stream), &resent, &missing);
+    return missing;
+}
+
+/* Whether the buffer is a whole frame of the kind that was asked for; else the reason in words. */
+static bool is_whole(const aravis_camera *a, ArvBuffer *buffer, uint64_t n_missing, char reason[128])
+{
+    const ArvBufferStatus status = arv_buffer_get_status(buffer);
+    if (status != ARV_BUFFER_STATUS_SUCCESS) {
+        snprintf(reason, 128, "the frame is incomplete: %s (%" PRIu64 " missing)", status_words(status),
+                 n_missing);
+        return false;
+    }
+    size_t size = 0;
+    const size_t wanted = weft_raw_format_bytes(&a->format, (size_t)a->info->width * (size_t)a->info->height);
+    (void)arv_buffer_get_image_data(buffer, &size);
+    if (arv_buffer_get_image_pixel_format(buffer) != a->code ||
+        arv_buffer_get_image_width(buffer) != a->info->width ||
+        arv_buffer_get_image_height(buffer) != a->info->height || size < wanted) {
+        snprintf(reason, 128, "the frame is %d x %d of format 0x%08x, not %d x %d %s",
+                 arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer),
+                 (unsigned)arv_buffer_get_image_pixel_format(buffer), a->info->width, a->info->height,
+                 a->format.name);
+        return false;
+    }
+    return true;
+}
+
+static weft_err fill_mosaic(const aravis_camera *a, ArvBuffer *buffer, weft_mosaic *mosaic, weft_error *err)
+{
+    if (!mosaic->data || mosaic->width != a->info->width || mosaic->height != a->info->height) {
+        weft_mosaic_fini(mosaic);
+        WEFT_TRY(weft_mosaic_init(mosaic, a->info->width, a->info->height, a->format.cfa, err));
+    }
+    mosaic->cfa = a->format.cfa;
+    mosaic->white = (float)a->info->white;
+    for (int i = 0; i < 4; i++)
+        mosaic->black[i] = (float)a->info->black[i];
+    size_t size = 0;
+    const uint8_t *const bytes = arv_buffer_get_image_data(buffer, &size);
+    weft_raw_format_unpack(&a->format, bytes, (size_t)mosaic->width * (size_t)mosaic->height, mosaic->data);
+    return WEFT_OK;
+}
+
+weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle, void *idle_context,
+                       weft_captured_frame *frame, weft_error *err)
+{
+    aravis_camera *const a = state;
+    ArvBuffer *buffer = NULL;
+    WEFT_TRY(check_there(a, err));
+    if (a->stale)
+        aravis_stop(a);
+    if (!a->stream)
+        WEFT_TRY(start(a, idle, idle_context, err));
+
+    frame->exposure_s = a->set.exposure_s;
+    frame->gain = a->set.gain;
+    frame->reason[0] = '\0';
+    const uint64_t missing_before = missing_packets(a);
+    WEFT_TRY(take(a, a->set.exposure_s + deadline_s, idle, idle_context, &buffer, err));
+    if (!buffer) {
+        frame->status = WEFT_FRAME_TIMEOUT;
+        snprintf(frame->reason, sizeof frame->reason, "no frame came within %.1f s after the exposure",
+                 deadline_s);
+        return WEFT_OK;
+    }
+    weft_err status = WEFT_OK;
+    frame->sequence = arv_buffer_get_frame_id(buffer);
+    if (is_whole(a, buffer, missing_packets(a) - missing_before, frame->reason)) {
+        frame->status = WEFT_FRAME_COMPLETE;
+        status = fill_mosaic(a, buffer, &frame->mosaic, err);
+    } else {
+        frame->status = WEFT_FRAME_INCOMPLETE;
+    }
+    arv_stream_push_buffer(a->stream, buffer);
+    return status;
+}

@@ -1,0 +1,248 @@
+/* The Aravis backend against a GigE Vision camera on loopback: every sample, every way to fail. */
+#include "tests/support/support.h"
+
+#include "core/progress.h"
+#include "host/camera/aravis_formats.h"
+#include "host/camera/camera.h"
+#include "tests/host/fake_camera.h"
+
+#include <math.h>
+#include <signal.h>
+#include <string.h>
+
+#define DEADLINE_S 1.0
+
+static fake_camera fake;
+
+static int end_fake(void **state)
+{
+    (void)state;
+    fake_camera_kill(&fake);
+    return 0;
+}
+
+static void expose_whole(weft_camera_device *camera, weft_captured_frame *frame)
+{
+    assert_ok(weft_camera_expose(camera, DEADLINE_S, frame, err));
+    if (frame->status != WEFT_FRAME_COMPLETE)
+        fail_msg("status %d: %s", frame->status, frame->reason);
+}
+
+/* Number of samples that are not what the fake camera draws. */
+static long count_wrong(const weft_captured_frame *frame, int bits)
+{
+    const weft_mosaic *const m = &frame->mosaic;
+    const uint32_t exposure_us = (uint32_t)lround(1e6 * frame->exposure_s), mask = (1u << bits) - 1;
+    long wrong = 0;
+    for (int i = bits == 16; i < m->width * m->height; i++) /* the first 16-bit sample counts frames */
+        wrong += m->data[i] != (fake_camera_sample(i % m->width, i / m->width, exposure_us, 0) & mask);
+    return wrong;
+}
+
+static void test_formats_by_name(void **state)
+{
+    (void)state;
+    weft_raw_format f;
+    const char *const names[] = {"Mono16", "BayerRG8", "BayerGR12Packed", "BayerGR12", "BayerGR12p"};
+    assert_true(weft_raw_format_best(names, 5, &f));
+    assert_string_equal(f.name, "BayerGR12");
+    assert_true(f.cfa == WEFT_CFA_GRBG && f.bits == 12);
+    assert_false(weft_raw_format_best(names, 1, &f));
+    assert_false(weft_raw_format_from_name("BayerXX12", &f));
+    assert_false(weft_raw_format_from_name("BayerRG", &f));
+    /* 0xABC, 0x123 as the two standards pack them; an odd count ends after two bytes. */
+    uint16_t s[3];
+    assert_true(weft_raw_format_from_name("BayerBG12p", &f));
+    weft_raw_format_unpack(&f, (const uint8_t[]){0xbc, 0x3a, 0x12, 0xef, 0x0d}, 3, s);
+    assert_true(s[0] == 0xabc && s[1] == 0x123 && s[2] == 0xdef);
+    assert_int_equal(weft_raw_format_bytes(&f, 3), 5);
+    assert_true(weft_raw_format_from_name("BayerBG12Packed", &f));
+    weft_raw_format_unpack(&f, (const uint8_t[]){0xab, 0x3c, 0x12}, 2, s);
+    assert_true(s[0] == 0xabc && s[1] == 0x123);
+    assert_non_null(weft_camera_find_quirk("Weft", "Virtual scanner"));
+    assert_null(weft_camera_find_quirk("Weft", "Other"));
+}
+
+static void check_format(const char *name, int bits, weft_cfa cfa, int n_frames)
+{
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, name, "640x482");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    const weft_camera_state *const info = weft_camera_get_state(camera);
+    assert_string_equal(info->id, "aravis:127.0.0.1");
+    assert_true(info->width == 640 && info->height == 482 && info->cfa == cfa && info->bits == bits);
+    assert_true(info->white == (1 << bits) - 1 && info->black[3] == 0 && info->gain == 1);
+    for (int i = 0; i < n_frames; i++) {
+        const weft_camera_settings wanted = {.exposure_s = 0.001 * (i + 1)};
+        assert_ok(weft_camera_configure(camera, &wanted, err));
+        assert_near(info->exposure_s, wanted.exposure_s, 1e-9);
+        const uint64_t before = frame.sequence;
+        expose_whole(camera, &frame);
+        assert_near(frame.exposure_s, wanted.exposure_s, 1e-9);
+        assert_int_equal(count_wrong(&frame, bits), 0);
+        assert_true(frame.sequence != before);
+        assert_true(frame.mosaic.cfa == cfa && frame.mosaic.white == (float)((1 << bits) - 1));
+    }
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+    fake_camera_kill(&fake);
+}
+
+static void test_frames_are_exact(void **state)
+{
+    (void)state;
+    check_format("BayerRG16", 16, WEFT_CFA_RGGB, 20);
+    check_format("BayerGB12p", 12, WEFT_CFA_GBRG, 3);
+    check_format("BayerBG8", 8, WEFT_CFA_BGGR, 3);
+}
+
+static void test_settings_out_of_range(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    assert_fails(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 60}, err),
+                 WEFT_ERR_RANGE, "only 1e-05 to 10 s");
+    assert_fails(weft_camera_configure(camera, &(weft_camera_settings){.gain = 4}, err), WEFT_ERR_UNSUPPORTED,
+                 "gain is not known");
+    weft_camera_close(camera);
+}
+
+static void test_lost_packets_make_a_frame_incomplete(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    int n[3] = {0};
+    fake_camera_start(&fake, "BayerRG16", "640x480");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    expose_whole(camera, &frame);
+    fake_camera_tell(&fake, "lost 0.06"); /* 12 packets a frame: about half are hit */
+    for (int i = 0; i < 40 && (n[WEFT_FRAME_COMPLETE] < 3 || n[WEFT_FRAME_INCOMPLETE] < 3); i++) {
+        weft_error error = {0};
+        /* A stream that was started anew may lose its throw-away frame as well. */
+        const weft_err status = weft_camera_expose(camera, 0.4, &frame, &error);
+        if (status != WEFT_OK)
+            continue;
+        n[frame.status]++;
+        if (frame.status == WEFT_FRAME_COMPLETE)
+            assert_int_equal(count_wrong(&frame, 16), 0);
+        if (frame.status == WEFT_FRAME_INCOMPLETE)
+            assert_non_null(strstr(frame.reason, "incomplete"));
+    }
+    assert_true(n[WEFT_FRAME_COMPLETE] >= 3 && n[WEFT_FRAME_INCOMPLETE] >= 3);
+    fake_camera_tell(&fake, "lost 0");
+    expose_whole(camera, &frame);
+    assert_int_equal(count_wrong(&frame, 16), 0);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_a_late_frame_is_not_taken_for_the_next(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    expose_whole(camera, &frame);
+    const int first = frame.mosaic.data[0];
+    fake_camera_tell(&fake, "delay 900");
+    assert_ok(weft_camera_expose(camera, 0.3, &frame, err));
+    assert_int_equal(frame.status, WEFT_FRAME_TIMEOUT);
+    assert_non_null(strstr(frame.reason, "0.3 s"));
+    fake_camera_tell(&fake, "delay 0");
+    expose_whole(camera, &frame);
+    assert_true(frame.mosaic.data[0] - first >= 3); /* the late one and a throw-away lie between */
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static weft_err kill_camera(void *context, weft_error *err)
+{
+    (void)context, (void)err;
+    if (fake.pid > 0)
+        fake_camera_kill(&fake);
+    return WEFT_OK;
+}
+
+static weft_err cancel(void *context, weft_error *err)
+{
+    (void)context;
+    return weft_fail(err, WEFT_ERR_CANCELLED, "enough");
+}
+
+static void test_a_wait_can_be_cancelled(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    expose_whole(camera, &frame);
+    fake_camera_tell(&fake, "delay 600");
+    weft_camera_set_idle(camera, cancel, NULL);
+    const double start_s = weft_clock_s();
+    assert_fails(weft_camera_expose(camera, 5, &frame, err), WEFT_ERR_CANCELLED, "enough");
+    assert_true(weft_clock_s() - start_s < 0.5);
+    weft_camera_set_idle(camera, NULL, NULL);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_a_camera_that_dies_is_an_error_in_time(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    expose_whole(camera, &frame);
+    fake_camera_tell(&fake, "delay 5000");
+    weft_camera_set_idle(camera, kill_camera, NULL);
+    const double start_s = weft_clock_s();
+    weft_error error = {0};
+    assert_int_not_equal(weft_camera_expose(camera, 4, &frame, &error), WEFT_OK);
+    assert_non_null(strstr(error.text, "camera 127.0.0.1"));
+    assert_non_null(strstr(error.text, "cable"));
+    assert_true(weft_clock_s() - start_s < 4.6);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_ids(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    assert_fails(weft_camera_open("nikon", &camera, err), WEFT_ERR_USAGE, "aravis:192.168.1.20");
+    assert_fails(weft_camera_open("v4l:/dev/video0", &camera, err), WEFT_ERR_USAGE, "backends aravis");
+    assert_fails(weft_camera_open("aravis:", &camera, err), WEFT_ERR_USAGE, "BACKEND:ADDRESS");
+    assert_null(camera);
+}
+
+static void test_no_raw_format(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    fake_camera_start(&fake, "Mono8", "64x64");
+    assert_fails(weft_camera_open("aravis:127.0.0.1", &camera, err), WEFT_ERR_UNSUPPORTED,
+                 "no raw Bayer format (only Mono8");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_formats_by_name),
+        cmocka_unit_test(test_ids),
+        cmocka_unit_test_teardown(test_frames_are_exact, end_fake),
+        cmocka_unit_test_teardown(test_settings_out_of_range, end_fake),
+        cmocka_unit_test_teardown(test_no_raw_format, end_fake),
+        cmocka_unit_test_teardown(test_lost_packets_make_a_frame_incomplete, end_fake),
+        cmocka_unit_test_teardown(test_a_late_frame_is_not_taken_for_the_next, end_fake),
+        cmocka_unit_test_teardown(test_a_wait_can_be_cancelled, end_fake),
+        cmocka_unit_test_teardown(test_a_camera_that_dies_is_an_error_in_time, end_fake),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
