@@ -97,6 +97,16 @@ weft_err weft_field_parse(const weft_field *field, const char *text, void *args,
             return weft_fail(err, WEFT_ERR_USAGE, "--%s: the value is not UTF-8", field->key);
         *(const char **)at = text;
         return WEFT_OK;
+    case WEFT_FIELD_TEXTS: {
+        weft_texts *const texts = at;
+        if (!weft_text_is_utf8(text, strlen(text)))
+            return weft_fail(err, WEFT_ERR_USAGE, "--%s: the value is not UTF-8", field->key);
+        if (texts->n == WEFT_TEXTS_MAX)
+            return weft_fail(err, WEFT_ERR_USAGE, "--%s: given more than %d times", field->key,
+                             WEFT_TEXTS_MAX);
+        texts->values[texts->n++] = text;
+        return WEFT_OK;
+    }
     case WEFT_FIELD_CHOICE: {
         const int index = choice_index(field->choices, text);
         if (index < 0)
@@ -241,6 +251,8 @@ static bool given(const weft_field *field, void *args)
         return ((const weft_size *)at)->width != 0;
     case WEFT_FIELD_F64S:
         return ((const weft_numbers *)at)->n != no_numbers.n;
+    case WEFT_FIELD_TEXTS:
+        return ((const weft_texts *)at)->n != 0;
     default:
         return true; /* numbers have a default where it matters */
     }

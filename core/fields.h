@@ -20,6 +20,7 @@ typedef enum weft_field_type {
     WEFT_FIELD_CHOICE, /* int, index into `choices` ("lsq|robust") */
     WEFT_FIELD_SIZE,   /* weft_size, "1232x816"; {0,0} when not given */
     WEFT_FIELD_F64S,   /* weft_numbers, "1,2.5,-3" */
+    WEFT_FIELD_TEXTS,  /* weft_texts, may be given several times: --param a=1 --param b=2 */
 } weft_field_type;
 
 typedef struct weft_size {
@@ -32,6 +33,13 @@ typedef struct weft_numbers {
     int n; /* 0 when not given */
     double values[WEFT_NUMBERS_MAX];
 } weft_numbers;
+
+#define WEFT_TEXTS_MAX 32
+
+typedef struct weft_texts {
+    int n; /* 0 when not given */
+    const char *values[WEFT_TEXTS_MAX];
+} weft_texts;
 
 /** A row; the table ends with {0}. */
 typedef struct weft_field {

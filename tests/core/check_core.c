@@ -66,6 +66,7 @@ typedef struct sample_args {
     const char *name;
     weft_size size;
     weft_numbers at;
+    weft_texts words;
 } sample_args;
 
 static const weft_field sample_fields[] = {
@@ -99,6 +100,7 @@ static const weft_field sample_fields[] = {
     {.key = "name", .type = WEFT_FIELD_TEXT, .offset = offsetof(sample_args, name), .help = "a name"},
     {.key = "size", .type = WEFT_FIELD_SIZE, .offset = offsetof(sample_args, size), .help = "a size"},
     {.key = "at", .type = WEFT_FIELD_F64S, .offset = offsetof(sample_args, at), .help = "a place"},
+    {.key = "word", .type = WEFT_FIELD_TEXTS, .offset = offsetof(sample_args, words), .help = "a word"},
     {0},
 };
 
@@ -129,6 +131,12 @@ static void test_options_parse(void **state)
     char *none[] = {"a"};
     assert_ok(parse(&args, 1, none, operands, &n, err));
     assert_true(args.count == 3 && args.method == 1 && args.exposure == 0.02 && !args.name);
+    assert_int_equal(args.words.n, 0);
+    char *repeated[] = {"--word", "a=1", "--word=b=2"};
+    assert_ok(parse(&args, 3, repeated, operands, &n, err));
+    assert_int_equal(args.words.n, 2);
+    assert_string_equal(args.words.values[0], "a=1");
+    assert_string_equal(args.words.values[1], "b=2");
 }
 
 static void test_options_refuse(void **state)
@@ -151,6 +159,7 @@ static void test_options_refuse(void **state)
         {"--flag=1", NULL, "no value"},
         {"--name", NULL, "wants a value"},
         {"--name", "\xff", "UTF-8"},
+        {"--word", "\xff", "UTF-8"},
         {"-z", NULL, "no such option"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
