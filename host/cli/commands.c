@@ -1,9 +1,11 @@
 #include "host/cli/command.h"
 
+extern const weft_command weft_cmd_brdf;
 extern const weft_command weft_cmd_completion;
 
 /* In the order of the help: the way of the data, from the lights to the picture. */
 const weft_command *const weft_commands[] = {
+    &weft_cmd_brdf,
     &weft_cmd_completion,
     NULL,
 };

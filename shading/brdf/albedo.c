@@ -7,15 +7,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define MAX_BATCH (2 * WEFT_QUADRATURE_MAX)
-
 /* One integral under way. */
 typedef struct integral {
     weft_albedo_fn *fn;
     void *context;
     weft_albedo_domain domain;
+    bool anisotropic;
     double nv, sv, view[3];
-    double tangent[2]; /* unit azimuth of the view */
+    double phi_rad; /* azimuth of the view, and its cosine and sine */
+    double tangent[2];
     weft_quadrature q;
     double sum[3];
 } integral;
@@ -34,27 +34,28 @@ static double azimuth_reach(const integral *in, weft_albedo_domain domain, doubl
     return acos(over / under);
 }
 
-/* Adds the half vectors at polar angle theta and azimuths begin..end on both sides of the view's. */
+/* Adds the half vectors at polar angle theta and azimuths begin..end from that of the view. */
 static void add_arc(integral *in, double theta, double begin, double end, double weight)
 {
     const double nh = cos(theta), sh = sin(theta);
-    double light[3][MAX_BATCH], view[3][MAX_BATCH], value[3][MAX_BATCH], w[MAX_BATCH];
-    int n = 0;
-    for (int side = -1; side <= 1; side += 2)
-        for (int i = 0; i < in->q.n; i++, n++) {
-            const double phi = side * (begin + (end - begin) * in->q.at[i]);
-            const double along = cos(phi), across = sin(phi);
-            const double h[3] = {sh * (along * in->tangent[0] - across * in->tangent[1]),
-                                 sh * (along * in->tangent[1] + across * in->tangent[0]), nh};
-            const double vh = in->sv * sh * along + in->nv * nh;
-            for (int c = 0; c < 3; c++) {
-                light[c][n] = 2 * vh * h[c] - in->view[c];
-                view[c][n] = in->view[c];
-            }
-            w[n] = weight * in->q.weight[i] * (end - begin) * sh * 4 * weft_max(vh, 0);
-            if (in->domain == WEFT_ALBEDO_UPPER)
-                w[n] *= weft_max(light[2][n], 0);
+    double light[3][WEFT_QUADRATURE_MAX], view[3][WEFT_QUADRATURE_MAX], value[3][WEFT_QUADRATURE_MAX];
+    double w[WEFT_QUADRATURE_MAX];
+    const int n = in->q.n;
+    for (int i = 0; i < n; i++) {
+        const double phi =
+            in->q.at[i] < 0.5 ? begin + (end - begin) * in->q.at[i] : end - (end - begin) * in->q.to_end[i];
+        const double along = cos(phi), across = sin(phi);
+        const double h[3] = {sh * (along * in->tangent[0] - across * in->tangent[1]),
+                             sh * (along * in->tangent[1] + across * in->tangent[0]), nh};
+        const double vh = in->sv * sh * along + in->nv * nh;
+        for (int c = 0; c < 3; c++) {
+            light[c][i] = 2 * vh * h[c] - in->view[c];
+            view[c][i] = in->view[c];
         }
+        w[i] = weight * in->q.weight[i] * (end - begin) * sh * 4 * weft_max(vh, 0);
+        if (in->domain == WEFT_ALBEDO_UPPER)
+            w[i] *= weft_max(light[2][i], 0);
+    }
     const weft_brdf_batch batch = {
         .n = n, .light = {light[0], light[1], light[2]}, .view = {view[0], view[1], view[2]}};
     double *const out[3] = {value[0], value[1], value[2]};
@@ -64,16 +65,35 @@ static void add_arc(integral *in, double theta, double begin, double end, double
             in->sum[c] += w[i] > 0 ? w[i] * value[c][i] : 0;
 }
 
+/* Both arcs begin..end beside the view's azimuth; those of anisotropic models are cut at tangent and
+ * bitangent, where a lobe can be as narrow as it likes, for the nodes crowd at the ends. */
+static void add_arcs(integral *in, double theta, double begin, double end, double weight)
+{
+    const double quarter = WEFT_PI / 2;
+    for (int side = -1; side <= 1; side += 2) {
+        double from = side < 0 ? -end : begin;
+        const double to = side < 0 ? -begin : end;
+        while (in->anisotropic) {
+            const double cut = (floor((in->phi_rad + from) / quarter + 1e-9) + 1) * quarter - in->phi_rad;
+            if (cut >= to)
+                break;
+            add_arc(in, theta, from, cut, weight);
+            from = cut;
+        }
+        add_arc(in, theta, from, to, weight);
+    }
+}
+
 /* The ring is cut where the light meets the horizon: a density may have a kink there. */
 static void add_ring(integral *in, double theta, double weight)
 {
     const double lit = azimuth_reach(in, WEFT_ALBEDO_UPPER, theta);
     if (lit > 0)
-        add_arc(in, theta, 0, lit, weight);
+        add_arcs(in, theta, 0, lit, weight);
     if (in->domain == WEFT_ALBEDO_VISIBLE) {
         const double reach = azimuth_reach(in, WEFT_ALBEDO_VISIBLE, theta);
         if (reach > lit)
-            add_arc(in, theta, lit, reach, weight);
+            add_arcs(in, theta, lit, reach, weight);
     }
 }
 
@@ -94,11 +114,16 @@ static int by_value(const void *a, const void *b)
 }
 
 void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
-                           double phi_rad, weft_albedo_effort effort, double value[3])
+                           double phi_rad, bool anisotropic, weft_albedo_effort effort, double value[3])
 {
     static const double decades[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 1, 2.5, 10, 100, 1e3, 1e4};
     enum { N_DECADES = sizeof decades / sizeof decades[0], N_CUTS = N_DECADES + 4 };
-    integral in = {.fn = fn, .context = context, .domain = domain, .nv = nv};
+    integral in = {.fn = fn,
+                   .context = context,
+                   .domain = domain,
+                   .anisotropic = anisotropic,
+                   .nv = nv,
+                   .phi_rad = phi_rad};
     assert(nv > 0 && nv <= 1);
     weft_brdf_direction(nv, phi_rad, in.view);
     in.sv = sqrt((1 - nv) * (1 + nv));
@@ -122,14 +147,14 @@ void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain
 /* A model and its constant parameters spread over a batch. */
 typedef struct spread_model {
     const weft_brdf *brdf;
-    double planes[WEFT_BRDF_MAX_PLANES][MAX_BATCH];
+    double planes[WEFT_BRDF_MAX_PLANES][WEFT_QUADRATURE_MAX];
 } spread_model;
 
 static void spread(spread_model *model, const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES])
 {
     model->brdf = brdf;
     for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
-        for (int i = 0; i < MAX_BATCH; i++)
+        for (int i = 0; i < WEFT_QUADRATURE_MAX; i++)
             model->planes[k][i] = values[k];
 }
 
@@ -162,7 +187,8 @@ void weft_brdf_albedo(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_P
 {
     spread_model model;
     spread(&model, brdf, values);
-    weft_albedo_integrate(eval_model, &model, WEFT_ALBEDO_UPPER, nv, phi_rad, effort, albedo);
+    weft_albedo_integrate(eval_model, &model, WEFT_ALBEDO_UPPER, nv, phi_rad,
+                          brdf->flags & WEFT_BRDF_ANISOTROPIC, effort, albedo);
 }
 
 double weft_brdf_pdf_integral(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES], double nv,
@@ -171,6 +197,7 @@ double weft_brdf_pdf_integral(const weft_brdf *brdf, const double values[WEFT_BR
     spread_model model;
     double sum[3];
     spread(&model, brdf, values);
-    weft_albedo_integrate(eval_density, &model, WEFT_ALBEDO_VISIBLE, nv, phi_rad, effort, sum);
+    weft_albedo_integrate(eval_density, &model, WEFT_ALBEDO_VISIBLE, nv, phi_rad,
+                          brdf->flags & WEFT_BRDF_ANISOTROPIC, effort, sum);
     return sum[0];
 }

@@ -10,6 +10,8 @@
 
 #include "shading/brdf/brdf.h"
 
+#include <stdbool.h>
+
 /** How hard to work. */
 typedef enum weft_albedo_effort {
     WEFT_ALBEDO_QUICK, /* about 6 digits, 0.5 ms */
@@ -28,9 +30,10 @@ typedef enum weft_albedo_domain {
 } weft_albedo_domain;
 
 /** Integral of fn over the domain for the view at cosine `nv` (0 < nv <= 1) and azimuth phi_rad.
- *  Only batch->light and batch->view are set. */
+ *  `anisotropic` says that fn turns with the tangent and may be narrow along it or across.  Only
+ *  batch->light and batch->view are set. */
 void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
-                           double phi_rad, weft_albedo_effort effort, double value[3]);
+                           double phi_rad, bool anisotropic, weft_albedo_effort effort, double value[3]);
 
 /** Directional albedo of a model: the share of light that comes back when all of the hemisphere shines,
  *  seen from (nv, phi_rad); by reciprocity also what a beam from there gives back in all. */

@@ -9,7 +9,7 @@ enum { ALBEDO = 0, F0 = 3, ALPHA = 6, AMPLITUDE = 7 }; /* first planes */
 static const weft_brdf_param params[] = {
     {"albedo", "cdiff", 3, 0, 1, 0.5, "", "diffuse reflectance"},
     {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance of the fibres at normal incidence, the tint of the rim"},
-    {"alpha", NULL, 1, 0.001, 1, 0.5, "", "width of the rim lobe"},
+    {"alpha", NULL, 1, 1e-4, 1, 0.5, "", "width of the rim lobe"},
     {"amplitude", "A", 1, 0, 4, 4, "", "weight of the rim lobe against the constant offset"},
     {0},
 };

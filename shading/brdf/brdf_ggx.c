@@ -8,7 +8,7 @@ enum { ALBEDO = 0, F0 = 3, ALPHA = 6 }; /* first planes */
 static const weft_brdf_param params[] = {
     {"albedo", "cdiff", 3, 0, 1, 0.5, "", "diffuse reflectance"},
     {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
-    {"alpha", NULL, 1, 0.001, 1, 0.3, "",
+    {"alpha", NULL, 1, 1e-4, 1, 0.3, "",
      "roughness, the width of the lobe (the square of the artist's value)"},
     {0},
 };

@@ -3,13 +3,13 @@
 
 #include "core/clones.h"
 
-#define ALPHA_FLOOR 0.001 /* of the bitangent at anisotropy 1 (S-ORD-06 trap b) */
+#define ALPHA_FLOOR 1e-5 /* of the bitangent at anisotropy 1 (S-ORD-06 trap b) */
 
 enum { F0 = 0, ALPHA = 3, ANISOTROPY = 4 }; /* first planes */
 
 static const weft_brdf_param params[] = {
     {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
-    {"alpha", NULL, 1, 0.001, 1, 0.4, "", "roughness along the tangent, the width of the lobe"},
+    {"alpha", NULL, 1, 1e-4, 1, 0.4, "", "roughness along the tangent, the width of the lobe"},
     {"anisotropy", NULL, 1, 0, 1, 0.5, "",
      "how much smoother the bitangent is: its roughness is alpha (1 - anisotropy)"},
     {0},

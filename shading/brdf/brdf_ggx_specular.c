@@ -5,7 +5,7 @@
 
 static const weft_brdf_param params[] = {
     {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
-    {"alpha", NULL, 1, 0.001, 1, 0.3, "",
+    {"alpha", NULL, 1, 1e-4, 1, 0.3, "",
      "roughness, the width of the lobe (the square of the artist's value)"},
     {0},
 };

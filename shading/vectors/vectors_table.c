@@ -106,8 +106,8 @@ static void ggx_furnace(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         double alpha = in[0][i], sum[3];
-        weft_albedo_integrate(furnace_integrand, &alpha, WEFT_ALBEDO_UPPER, in[1][i], 0, WEFT_ALBEDO_EXACT,
-                              sum);
+        weft_albedo_integrate(furnace_integrand, &alpha, WEFT_ALBEDO_UPPER, in[1][i], 0, false,
+                              WEFT_ALBEDO_EXACT, sum);
         for (int c = 0; c < 3; c++)
             out[c][i] = sum[c];
     }

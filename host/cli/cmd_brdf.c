@@ -1,0 +1,189 @@
+#include "host/cli/brdf_eval.h"
+#include "host/cli/command.h"
+
+#include "core/csv.h"
+#include "core/mem.h"
+#include "shading/brdf/brdf.h"
+#include "shading/vectors/vectors.h"
+
+#include <string.h>
+
+typedef struct brdf_args {
+    const char *eval;
+    weft_texts params;
+} brdf_args;
+
+static const weft_field fields[] = {
+    {.key = "eval",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(brdf_args, eval),
+     .unit = "FILE.csv",
+     .help = "print the rows of a table with the value at each appended"},
+    {.key = "param",
+     .short_opt = 'p',
+     .type = WEFT_FIELD_TEXTS,
+     .offset = offsetof(brdf_args, params),
+     .unit = "NAME=VALUE",
+     .help = "a parameter that the table does not give, also as r,g,b; may be given several times"},
+    {0},
+};
+
+static void print_model(const weft_invocation *inv, const weft_brdf *brdf)
+{
+    fprintf(inv->out, "%s: %s\n  %s\n  %s%s%s\n", brdf->name, brdf->summary, brdf->source,
+            brdf->flags & WEFT_BRDF_RECIPROCAL ? "reciprocal" : "not reciprocal",
+            brdf->flags & WEFT_BRDF_PASSIVE ? ", conserves energy" : ", can gain energy",
+            brdf->flags & WEFT_BRDF_ANISOTROPIC ? ", anisotropic" : "");
+    for (const weft_brdf_param *p = brdf->params; p->name; p++)
+        fprintf(inv->out, "  %-12s %s%g to %g%s%s (default %g)  %s\n", p->name,
+                p->components == 3 ? "colour, " : "", p->min, p->max, p->unit[0] ? " " : "", p->unit, p->def,
+                p->help);
+}
+
+static json_t *model_json(const weft_brdf *brdf)
+{
+    json_t *const params = json_array();
+    for (const weft_brdf_param *p = brdf->params; p->name; p++)
+        json_array_append_new(params, json_pack("{s:s, s:i, s:f, s:f, s:f, s:s, s:s}", "name", p->name,
+                                                "components", p->components, "min", p->min, "max", p->max,
+                                                "default", p->def, "unit", p->unit, "help", p->help));
+    return json_pack("{s:s, s:s, s:s, s:b, s:b, s:b, s:o}", "name", brdf->name, "summary", brdf->summary,
+                     "source", brdf->source, "reciprocal", brdf->flags & WEFT_BRDF_RECIPROCAL, "passive",
+                     brdf->flags & WEFT_BRDF_PASSIVE, "anisotropic", brdf->flags & WEFT_BRDF_ANISOTROPIC,
+                     "parameters", params);
+}
+
+static weft_err list_models(const weft_invocation *inv, const weft_brdf *only, weft_error *err)
+{
+    json_t *const models = json_array();
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        if (only && *b != only)
+            continue;
+        if (inv->json)
+            json_array_append_new(models, model_json(*b));
+        else
+            print_model(inv, *b);
+        if (!inv->json && !only && b[1])
+            fputc('\n', inv->out);
+    }
+    if (inv->json)
+        return weft_print_json(inv, json_pack("{s:o}", "models", models), err);
+    json_decref(models);
+    return WEFT_OK;
+}
+
+static void print_cell(FILE *out, const char *cell)
+{
+    if (!strpbrk(cell, ",\"\r\n")) {
+        fputs(cell, out);
+        return;
+    }
+    fputc('"', out);
+    for (const char *p = cell; *p; p++) {
+        if (*p == '"')
+            fputc('"', out);
+        fputc(*p, out);
+    }
+    fputc('"', out);
+}
+
+/* Prints the table with `n` columns behind it; values is [n][rows], NULL: the header. */
+static weft_err print_table(FILE *out, const weft_csv *csv, int n, char (*names)[80], const double *values,
+                            weft_error *err)
+{
+    for (int row = -1; row < csv->rows; row++) {
+        for (int c = 0; c < csv->columns; c++) {
+            print_cell(out, row < 0 ? csv->names[c] : weft_csv_cell(csv, row, c));
+            fputc(',', out);
+        }
+        for (int k = 0; k < n; k++) {
+            if (row < 0)
+                fputs(names[k], out);
+            else
+                fprintf(out, "%.17g", values[(size_t)k * (size_t)csv->rows + (size_t)row]);
+            fputc(k + 1 < n ? ',' : '\n', out);
+        }
+    }
+    if (fflush(out) != 0 || ferror(out))
+        return weft_fail_errno(err, WEFT_ERR_IO, "the result cannot be written");
+    return WEFT_OK;
+}
+
+static weft_err eval_function(const weft_invocation *inv, const weft_vectors_model *model,
+                              const weft_csv *csv, const char *path, weft_error *err)
+{
+    char names[WEFT_VECTORS_MAX_COLUMNS][80], word[64];
+    double *values = NULL;
+    int n;
+    WEFT_TRY(weft_vectors_eval(model, csv, path, &n, &values, err));
+    for (int k = 0; k < n; k++) {
+        weft_vectors_word(model->outputs, k, word);
+        snprintf(names[k], sizeof names[k], n == 1 ? "value" : "value_%s", word);
+    }
+    const weft_err status = print_table(inv->out, csv, n, names, values, err);
+    weft_free(values);
+    return status;
+}
+
+static weft_err eval_model(const weft_invocation *inv, const weft_brdf *brdf, const weft_texts *params,
+                           const weft_csv *csv, const char *path, weft_error *err)
+{
+    char one[1][80] = {"value"}, three[3][80] = {"value_r", "value_g", "value_b"};
+    double constant[WEFT_BRDF_MAX_PLANES], *values = NULL;
+    bool rgb;
+    weft_brdf_defaults(brdf, constant);
+    for (int i = 0; i < params->n; i++)
+        WEFT_TRY(weft_brdf_set(brdf, params->values[i], constant, err));
+    WEFT_TRY(weft_brdf_eval_table(brdf, constant, csv, path, &rgb, &values, err));
+    const weft_err status = print_table(inv->out, csv, rgb ? 3 : 1, rgb ? three : one, values, err);
+    weft_free(values);
+    return status;
+}
+
+static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
+{
+    const brdf_args *const a = args;
+    const char *const name = inv->n_operands ? inv->operands[0] : NULL;
+    const weft_brdf *brdf = NULL;
+    if (!a->eval) {
+        if (name)
+            WEFT_TRY(weft_brdf_find(name, &brdf, err));
+        return list_models(inv, brdf, err);
+    }
+    if (!name)
+        return weft_fail(err, WEFT_ERR_USAGE, "--eval wants the NAME of a model too");
+    if (inv->json)
+        return weft_fail(err, WEFT_ERR_USAGE, "--eval prints a table; it has no --json");
+    const weft_vectors_model *const function = weft_vectors_find(name);
+    if (!function)
+        WEFT_TRY(weft_brdf_find(name, &brdf, err));
+    else if (a->params.n)
+        return weft_fail(err, WEFT_ERR_USAGE, "%s takes all its inputs from the table, no --param", name);
+    weft_csv csv;
+    WEFT_TRY(weft_csv_read(a->eval, &csv, err));
+    const weft_err status = function ? eval_function(inv, function, &csv, a->eval, err)
+                                     : eval_model(inv, brdf, &a->params, &csv, a->eval, err);
+    weft_csv_fini(&csv);
+    return status;
+}
+
+const weft_command weft_cmd_brdf = {
+    .name = "brdf",
+    .summary = "list the reflectance models with their parameters, evaluate them at given angles",
+    .operands = "[NAME]",
+    .min_operands = 0,
+    .max_operands = 1,
+    .args_size = sizeof(brdf_args),
+    .fields = fields,
+    .details =
+        "The table of --eval names its columns in the first line: nl, nv (cosines of light and view) and "
+        "phi\n"
+        "(azimuth between them, rad), or lx ly lz vx vy vz (unit vectors, z is the normal), and parameters "
+        "by\n"
+        "name, a colour also as name_r, name_g, name_b.  Columns out_*, tag and note are passed through.  "
+        "The\n"
+        "value (1/sr, without the cosine) is appended with 17 digits.  NAME may also be that of a table of\n"
+        "reference values, such as ord_ggx_terms or cloth_albedo.",
+    .example = "weft brdf ggx --eval angles.csv --param alpha=0.3 --param f0=0.04",
+    .run = run,
+};

@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# weft brdf: the list, and values at the rows of a table.
+set -eu
+weft=$WEFT_TEST_BIN/weft
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
+    local status=0 wanted=$1 words=$2
+    shift 2
+    "$@" >"$work/out" 2>&1 || status=$?
+    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" "$work/out"; then
+        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
+        cat "$work/out"
+        exit 1
+    fi
+}
+
+expect 0 'cloth: velvet' "$weft" brdf
+expect 0 'alpha        0.0001 to 1 (default 0.3)' "$weft" brdf ggx
+"$weft" brdf --json | python3 -c '
+import json, sys
+models = {m["name"]: m for m in json.load(sys.stdin)["models"]}
+assert models["cloth"]["passive"] and not models["ggx"]["passive"]
+assert [p["name"] for p in models["ggx"]["parameters"]] == ["albedo", "f0", "alpha"]'
+expect 2 'no such BRDF; there are lambert' "$weft" brdf gxg
+
+# f at normal incidence: GGX f0/(4 pi alpha^2), Lambert albedo/pi, to 17 digits
+printf 'nl,nv,phi,alpha,f0,tag\n1,1,0,0.5,0.04,"a, b"\n' >"$work/t.csv"
+"$weft" brdf ggx-specular --eval "$work/t.csv" >"$work/got"
+printf 'nl,nv,phi,alpha,f0,tag,value\n1,1,0,0.5,0.04,"a, b",0.012732395447351628\n' | diff - "$work/got"
+printf 'lx,ly,lz,vx,vy,vz\n0,0,1,0.6,0,0.8\n' >"$work/t.csv"
+"$weft" brdf lambert --eval "$work/t.csv" --param albedo=1,0.5,0 | tail -1 >"$work/got"
+echo '0,0,1,0.6,0,0.8,0.31830988618379069,0.15915494309189535,0' | diff - "$work/got"
+# light at azimuth 0, view at 90 degrees
+printf 'alpha,nx\n0.5,1\n' >"$work/t.csv"
+expect 0 '0.5,1,1.2732395447351628,1,0.5' "$weft" brdf ord_ggx_terms --eval "$work/t.csv"
+
+bad() { # WORDS HEADER ROW
+    printf '%s\n%s\n' "$2" "$3" >"$work/bad.csv"
+    expect 1 "$1" "$weft" brdf ggx --eval "$work/bad.csv"
+}
+bad 'column aplha is neither' 'nl,nv,aplha' '1,1,0.5'
+bad 'there is no column nv' 'nl,alpha' '1,0.5'
+bad 'there is no column vz' 'lx,ly,lz,vx,vy' '0,0,1,0,0'
+bad 'row 1: nl is 1.5' 'nl,nv' '1.5,1'
+bad 'row 1: lx ly lz is 2 long' 'lx,ly,lz,vx,vy,vz' '0,0,2,0,0,1'
+bad 'row 1: alpha of ggx is 2' 'nl,nv,alpha' '1,1,2'
+bad '"x" is not a number' 'nl,nv' 'x,1'
+expect 2 'it has albedo, f0, alpha' "$weft" brdf ggx --eval "$work/t.csv" --param roughness=1
+expect 2 'wants the NAME' "$weft" brdf --eval "$work/t.csv"
+expect 1 'absent.csv' "$weft" brdf ggx --eval "$work/absent.csv"
