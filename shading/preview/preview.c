@@ -1,0 +1,290 @@
+#include "shading/preview/preview.h"
+
+#include "shading/preview/samples.h"
+
+#include "core/clones.h"
+#include "core/parallel.h"
+#include "shading/brdf/half.h"
+
+#include <string.h>
+
+void weft_preview_direction(double azimuth_deg, double elevation_deg, double direction[3])
+{
+    const double a = azimuth_deg * WEFT_PI / 180, e = elevation_deg * WEFT_PI / 180;
+    direction[0] = cos(e) * cos(a);
+    direction[1] = cos(e) * sin(a);
+    direction[2] = sin(e);
+}
+
+weft_preview_view weft_preview_view_defaults(void)
+{
+    weft_preview_view view = {.width = 512, .height = 512, .background = 0.18, .repeat = 1};
+    weft_preview_direction(135, 45, view.light.direction);
+    for (int c = 0; c < 3; c++)
+        view.light.irradiance[c] = WEFT_PI;
+    return view;
+}
+
+static weft_err check_size(const weft_preview_surface *surface, const weft_image *image, const char *what,
+                           weft_error *err)
+{
+    if (image->width == surface->width && image->height == surface->height)
+        return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_MISMATCH, "the %s map has %d x %d pixels, the others %d x %d", what,
+                     image->width, image->height, surface->width, surface->height);
+}
+
+weft_err weft_preview_set_map(weft_preview_surface *surface, const char *name, const weft_image *image,
+                              weft_error *err)
+{
+    int plane;
+    const weft_brdf_param *const param = weft_brdf_find_param(surface->brdf, name, &plane);
+    if (!param)
+        return weft_fail(err, WEFT_ERR_USAGE, "%s has no parameter %s that a map could give",
+                         surface->brdf->name, name);
+    WEFT_TRY(check_size(surface, image, name, err));
+    if (image->planes != 1 && image->planes != param->components)
+        return weft_fail(err, WEFT_ERR_MISMATCH, "the %s map has %d planes, wanted %s", name, image->planes,
+                         param->components == 3 ? "1 or 3" : "1");
+    for (int c = 0; c < param->components; c++)
+        surface->maps[plane + c] = (weft_preview_map){image, image->planes == 1 ? 0 : c};
+    return WEFT_OK;
+}
+
+/* Light and view in the frame of the shading normal, whose tangent stays in the plane of the map's X. */
+WEFT_CLONES
+static void turn_to_local(weft_preview_samples *s, double (*light)[WEFT_PREVIEW_RUN])
+{
+    WEFT_INDEPENDENT
+    for (int i = 0; i < s->n; i++) {
+        const double x = s->normal[0][i], y = s->normal[1][i], z = s->normal[2][i];
+        double n[3], t[3], local_l[3] = {0}, local_v[3] = {0};
+        for (int c = 0; c < 3; c++)
+            n[c] = x * s->axis[0][c][i] + y * s->axis[1][c][i] + z * s->axis[2][c][i];
+        /* tangent less its part along n; x is that part, for the axes are orthonormal */
+        const double inverse = 1 / sqrt(weft_max(1 - x * x, 1e-12));
+        for (int c = 0; c < 3; c++)
+            t[c] = (s->axis[0][c][i] - x * n[c]) * inverse;
+        const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+        for (int c = 0; c < 3; c++) {
+            const double l = light[c][i], v = s->eye[c][i];
+            local_l[0] += l * t[c];
+            local_l[1] += l * b[c];
+            local_l[2] += l * n[c];
+            local_v[0] += v * t[c];
+            local_v[1] += v * b[c];
+            local_v[2] += v * n[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            s->light[c][i] = local_l[c];
+            s->view[c][i] = local_v[c];
+        }
+    }
+}
+
+/* World direction to the light and its irradiance at each sample, as a share of that at the middle. */
+static void aim(const weft_preview_setup *setup, weft_preview_samples *s, double (*light)[WEFT_PREVIEW_RUN])
+{
+    const weft_preview_light *const from = &setup->view->light;
+    for (int i = 0; i < s->n; i++) {
+        double d[3], share = 1;
+        for (int c = 0; c < 3; c++)
+            d[c] = from->is_point ? from->position_mm[c] - s->position[c][i] * setup->surface->mm_per_px
+                                  : from->direction[c];
+        if (from->is_point) {
+            const double *const p = from->position_mm;
+            const double r2 = weft_max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1e-6);
+            share = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / r2;
+            for (int c = 0; c < 3; c++)
+                d[c] /= sqrt(r2);
+        }
+        for (int c = 0; c < 3; c++)
+            light[c][i] = d[c];
+        s->irradiance[i] = share;
+    }
+}
+
+/*
+ * How much of the light the shape itself lets through where a bumpy normal still faces it.
+ *
+ * A plane shadows nothing until the light is below it.  On the sphere a hard cut at the terminator would
+ * show as a line across the bumps; the soft one is Chiang et al. 2019 ("Taming the shadow terminator"):
+ * S = -G^3 + G^2 + G with G = min(1, (g.l)/((n.l)(g.n))), g the normal of the shape.
+ */
+static double shape_shadow(const weft_preview_setup *setup, double gl, double nl, double gn)
+{
+    if (gl <= 0 || nl <= 0)
+        return 0;
+    if (setup->view->shape == WEFT_PREVIEW_PLANE)
+        return 1;
+    const double product = nl * weft_max(gn, 1e-3), g = gl < product ? gl / product : 1;
+    return g * (1 + g * (1 - g));
+}
+
+static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    const weft_preview_view *const view = setup->view;
+    double light[3][WEFT_PREVIEW_RUN];
+    weft_brdf_batch batch = {.n = s->n,
+                             .light = {s->light[0], s->light[1], s->light[2]},
+                             .view = {s->view[0], s->view[1], s->view[2]}};
+    double *const value[3] = {s->value[0], s->value[1], s->value[2]};
+    for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
+        batch.param[k] = s->param[k];
+    aim(setup, s, light);
+    turn_to_local(s, light);
+    setup->surface->brdf->eval(&batch, value);
+    for (int i = 0; i < s->n; i++) {
+        const double gl =
+            light[0][i] * s->axis[2][0][i] + light[1][i] * s->axis[2][1][i] + light[2][i] * s->axis[2][2][i];
+        s->irradiance[i] *=
+            weft_max(s->light[2][i], 0) * shape_shadow(setup, gl, s->light[2][i], s->normal[2][i]);
+    }
+    const double exposure = exp2(view->exposure_ev);
+    for (int c = 0; c < 3; c++) {
+        const double *const albedo = setup->albedo_plane >= 0 ? s->param[setup->albedo_plane + c] : NULL;
+        for (int i = 0; i < s->n; i++) {
+            const double sky = albedo ? view->ambient * albedo[i] : 0;
+            const double lit = s->value[c][i] * s->irradiance[i] * view->light.irradiance[c] + sky;
+            s->value[c][i] = s->hit[i] > 0 ? exposure * lit : view->background;
+        }
+    }
+}
+
+typedef struct render {
+    const weft_preview_setup *setup;
+    weft_image *picture;
+} render;
+
+/* Adds a run of samples to a row of the picture under a tent two pixels wide. */
+static void splat_run(const render *r, const weft_preview_samples *s, int first, int row, double row_weight)
+{
+    const int width = r->picture->width, ss = r->setup->supersampling;
+    for (int c = 0; c < 3; c++) {
+        float *const to = weft_image_row(r->picture, c, row);
+        for (int i = 0; i < s->n; i++) {
+            const double px = (first + i + 0.5) / ss - 0.5, left = floor(px), right_weight = px - left;
+            const int at = (int)left;
+            if (at >= 0)
+                to[at] += (float)(row_weight * (1 - right_weight) * s->value[c][i]);
+            if (at + 1 < width)
+                to[at + 1] += (float)(row_weight * right_weight * s->value[c][i]);
+        }
+    }
+}
+
+/* Samples beyond the picture, which the tent wants, repeat its edge. */
+static double inside(double x, int size)
+{
+    const double half = size / 2.0;
+    return x < -half ? -half : x > half ? half : x;
+}
+
+static void shade_run(const weft_preview_setup *setup, weft_preview_samples *s, int first, int n, double y)
+{
+    const int ss = setup->supersampling, width = setup->view->width;
+    s->n = n;
+    for (int i = 0; i < n; i++) {
+        s->x[i] = inside((first + i + 0.5) / ss - width / 2.0, width);
+        s->y[i] = inside(y, setup->view->height);
+    }
+    weft_preview_hit(setup, s);
+    weft_preview_fetch(setup, s);
+    shade(setup, s);
+}
+
+/* Rows of samples reach half a pixel beyond those of the picture, for the tent. */
+static void render_rows(void *context, int band, int row_begin, int row_end)
+{
+    const render *const r = context;
+    const weft_preview_setup *const setup = r->setup;
+    const int ss = setup->supersampling, width = r->picture->width, height = r->picture->height;
+    const int last_column = width * ss + ss / 2;
+    weft_preview_samples s;
+    (void)band;
+    for (int line = row_begin * ss - ss / 2; line < row_end * ss + ss / 2; line++) {
+        const double py = (line + 0.5) / ss - 0.5, top = floor(py), lower = py - top;
+        const int row = (int)top;
+        for (int first = -ss / 2; first < last_column; first += WEFT_PREVIEW_RUN) {
+            const int rest = last_column - first;
+            shade_run(setup, &s, first, rest < WEFT_PREVIEW_RUN ? rest : WEFT_PREVIEW_RUN,
+                      height / 2.0 - (py + 0.5));
+            if (row >= row_begin && row < row_end)
+                splat_run(r, &s, first, row, (1 - lower) / (ss * ss));
+            if (row + 1 >= row_begin && row + 1 < row_end)
+                splat_run(r, &s, first, row + 1, lower / (ss * ss));
+        }
+    }
+}
+
+static weft_err find_crop(const weft_preview_surface *surface, weft_preview_crop *crop, weft_error *err)
+{
+    const weft_mask *const mask = surface->mask;
+    int x0 = surface->width, y0 = surface->height, x1 = -1, y1 = -1;
+    *crop = (weft_preview_crop){0, 0, surface->width, surface->height};
+    if (!mask)
+        return WEFT_OK;
+    for (int y = 0; y < mask->height; y++)
+        for (int x = 0; x < mask->width; x++)
+            if (mask->data[(size_t)y * (size_t)mask->width + (size_t)x]) {
+                x0 = x < x0 ? x : x0;
+                x1 = x > x1 ? x : x1;
+                y0 = y < y0 ? y : y0;
+                y1 = y;
+            }
+    if (x1 < 0)
+        return weft_fail(err, WEFT_ERR_NODATA, "the mask is empty: there is nothing to look at");
+    *crop = (weft_preview_crop){x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+    return WEFT_OK;
+}
+
+static weft_err check_surface(const weft_preview_surface *surface, const weft_preview_view *view,
+                              weft_error *err)
+{
+    if (surface->normal)
+        WEFT_TRY(check_size(surface, surface->normal, "normal", err));
+    if (surface->mask && (surface->mask->width != surface->width || surface->mask->height != surface->height))
+        return weft_fail(err, WEFT_ERR_MISMATCH, "the mask has %d x %d pixels, the maps %d x %d",
+                         surface->mask->width, surface->mask->height, surface->width, surface->height);
+    if (view->light.is_point && !(surface->mm_per_px > 0))
+        return weft_fail(err, WEFT_ERR_MISSING,
+                         "a light at a position in mm needs maps with a scale; these have none (solve with "
+                         "--geometry plane, or give the light as azimuth and elevation)");
+    if (!(view->repeat > 0 && view->repeat <= 1000) || !(view->fov_deg >= 0 && view->fov_deg < 170))
+        return weft_fail(err, WEFT_ERR_RANGE, "wanted a repeat of more than 0 and a field of view below 170");
+    return WEFT_OK;
+}
+
+static void set_ranges(weft_preview_setup *setup)
+{
+    const weft_brdf *const brdf = setup->surface->brdf;
+    int plane = 0;
+    setup->albedo_plane = -1;
+    for (const weft_brdf_param *p = brdf->params; p->name; p++) {
+        if (strcmp(p->name, "albedo") == 0 && p->components == 3)
+            setup->albedo_plane = plane;
+        for (int c = 0; c < p->components; c++, plane++) {
+            setup->low[plane] = p->min;
+            setup->high[plane] = p->max;
+        }
+    }
+}
+
+weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
+                             weft_image *picture, weft_error *err)
+{
+    weft_preview_setup setup = {.surface = surface, .view = view};
+    weft_image made;
+    WEFT_TRY(check_surface(surface, view, err));
+    WEFT_TRY(find_crop(surface, &setup.crop, err));
+    set_ranges(&setup);
+    weft_preview_setup_shape(&setup);
+    WEFT_TRY(weft_image_init(&made, view->width, view->height, 3, err));
+    const weft_err status =
+        weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
+    if (status != WEFT_OK)
+        weft_image_fini(&made);
+    else
+        *picture = made;
+    return status;
+}

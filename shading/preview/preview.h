@@ -1,0 +1,86 @@
+/**
+ * Looks at solved maps under a movable light, in software: arrays in, a linear picture out.
+ *
+ * World frame as everywhere: +X right in the picture, +Y up, +Z to the viewer; map row 0 is the top row.
+ * Normal maps are X right, Y up, Z out.  Light is linear BT.709.  A white Lambertian card that faces the
+ * light reads 1 at exposure 0 (irradiance pi), so albedos can be read off; nothing is tone mapped.
+ *
+ * Every sample is shaded before it is averaged: a filtered normal map would look smoother than the cloth.
+ * There is at least one sample a texel and four a pixel, weighted by a tent two pixels wide, which keeps
+ * weaves near the pixel pitch from beating.
+ */
+#ifndef WEFT_SHADING_PREVIEW_PREVIEW_H
+#define WEFT_SHADING_PREVIEW_PREVIEW_H
+
+#include "core/error.h"
+#include "core/image.h"
+#include "shading/brdf/brdf.h"
+
+#include <stdbool.h>
+
+typedef enum weft_preview_shape {
+    WEFT_PREVIEW_PLANE,  /* the map as it lies, whole, aspect kept */
+    WEFT_PREVIEW_SPHERE, /* the map wrapped on a ball from the pole that faces the viewer, equidistant along
+                            meridians; repeats mirrored */
+} weft_preview_shape;
+
+/** The light: distant, or a point near the surface. */
+typedef struct weft_preview_light {
+    bool is_point;
+    double direction[3];   /* distant: unit, towards the light */
+    double position_mm[3]; /* point: from the middle of the plane, or of the sphere; it gives the irradiance
+                              below at the middle and falls with the square of the distance */
+    double irradiance[3];  /* of a surface that faces the light, linear RGB; pi makes a white card read 1 */
+} weft_preview_light;
+
+/** Unit vector to a light at `azimuth_deg` from +X (90 is +Y) and `elevation_deg` above the plane. */
+void weft_preview_direction(double azimuth_deg, double elevation_deg, double direction[3]);
+
+/** One plane of a picture as the values of one plane of parameters. */
+typedef struct weft_preview_map {
+    const weft_image *image; /* NULL: the constant */
+    int plane;
+} weft_preview_map;
+
+/** What is looked at.  Pictures are borrowed. */
+typedef struct weft_preview_surface {
+    int width, height;        /* of every map */
+    double mm_per_px;         /* 0: unknown (no point lights then) */
+    const weft_image *normal; /* [3]; NULL: flat.  Need not be unit length; (0,0,0) counts as (0,0,1) */
+    const weft_mask *mask;    /* 0 shows the background; NULL: all of it is the sample */
+    const weft_brdf *brdf;
+    double params[WEFT_BRDF_MAX_PLANES];         /* constants, see weft_brdf_defaults() */
+    weft_preview_map maps[WEFT_BRDF_MAX_PLANES]; /* override the constants; clamped to their ranges */
+} weft_preview_surface;
+
+/** Uses `image` (1 plane, or as many as the parameter has) for a parameter of surface->brdf.
+ *  @return WEFT_ERR_USAGE when the model has none of that name, WEFT_ERR_MISMATCH for a wrong size. */
+weft_err weft_preview_set_map(weft_preview_surface *surface, const char *param, const weft_image *image,
+                              weft_error *err);
+
+/** How it is looked at.  weft_preview_view_defaults() fills it. */
+typedef struct weft_preview_view {
+    int width, height;
+    weft_preview_shape shape;
+    weft_preview_light light;
+    double ambient;     /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
+    double exposure_ev; /* the picture is multiplied by 2^exposure_ev */
+    double background;  /* linear grey, not exposed */
+    double repeat;      /* sphere: how often the shorter side of the map fits half round; > 0 */
+    double fov_deg;     /* 0: orthographic; else the camera's field of view over the shorter side */
+} weft_preview_view;
+
+/** 512 x 512, plane, light from the upper left at 45 degrees, ambient 0, background 0.18, repeat 1. */
+weft_preview_view weft_preview_view_defaults(void);
+
+/**
+ * Renders the surface.
+ *
+ * @param picture  uninitialised; gets 3 planes, linear, not clamped above 1
+ * @return WEFT_ERR_RANGE, WEFT_ERR_MISMATCH for maps of different sizes, WEFT_ERR_MISSING for a point light
+ *         over a map without scale, WEFT_ERR_NODATA for an empty mask, WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
+ */
+weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
+                             weft_image *picture, weft_error *err);
+
+#endif

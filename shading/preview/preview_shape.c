@@ -1,0 +1,130 @@
+#include "shading/preview/samples.h"
+
+#include "core/clones.h"
+#include "shading/brdf/half.h"
+
+#define SPHERE_SHARE      0.92 /* of the shorter side that the sphere's outline takes */
+#define MAX_SUPERSAMPLING 16
+
+static int even_at_least(double samples)
+{
+    int n = 2;
+    while (n < samples && n < MAX_SUPERSAMPLING)
+        n += 2;
+    return n;
+}
+
+void weft_preview_setup_shape(weft_preview_setup *setup)
+{
+    const weft_preview_view *const view = setup->view;
+    const weft_preview_crop crop = setup->crop;
+    const double side = view->width < view->height ? view->width : view->height;
+    const double half_fov = view->fov_deg * WEFT_PI / 360;
+    if (view->shape == WEFT_PREVIEW_PLANE) {
+        setup->texels_per_px = weft_max((double)crop.width / view->width, (double)crop.height / view->height);
+        setup->eye_distance = view->fov_deg > 0 ? side / 2 / tan(half_fov) : 0;
+        setup->supersampling = even_at_least(setup->texels_per_px);
+        return;
+    }
+    const double shorter = crop.width < crop.height ? crop.width : crop.height;
+    setup->radius_px = SPHERE_SHARE * side / 2;
+    setup->radius_texels = view->repeat * shorter / WEFT_PI;
+    setup->texels_per_px = setup->radius_texels / setup->radius_px;
+    /* the cone that touches the sphere has sin(angle) = 1/distance, and its outline SPHERE_SHARE of the field
+     */
+    setup->eye_distance = view->fov_deg > 0 ? 1 / sin(atan(SPHERE_SHARE * tan(half_fov))) : 0;
+    setup->supersampling = even_at_least(1.5 * setup->texels_per_px); /* texels crowd towards the outline */
+}
+
+static void set_axes(weft_preview_samples *s, int i, double x, double y, double z)
+{
+    /* The rotation that takes +Z to (x, y, z) the shortest way: the frame a flat cloth would keep when it is
+     * laid on the sphere from the pole. */
+    const double k = 1 / (1 + z);
+    const double axes[3][3] = {{1 - x * x * k, -x * y * k, -x}, {-x * y * k, 1 - y * y * k, -y}, {x, y, z}};
+    for (int a = 0; a < 3; a++)
+        for (int c = 0; c < 3; c++)
+            s->axis[a][c][i] = axes[a][c];
+}
+
+static void set_eye(weft_preview_samples *s, int i, double x, double y, double z)
+{
+    const double inverse = 1 / sqrt(x * x + y * y + z * z);
+    s->eye[0][i] = x * inverse;
+    s->eye[1][i] = y * inverse;
+    s->eye[2][i] = z * inverse;
+}
+
+/* A camera that looks straight down on a plane sees it as an orthographic one does; only the directions to
+ * the eye differ. */
+static void hit_plane(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    const double scale = setup->texels_per_px, eye = setup->eye_distance;
+    const double half_width = setup->crop.width / 2.0, half_height = setup->crop.height / 2.0;
+    for (int i = 0; i < s->n; i++) {
+        const double x = s->x[i] * scale, y = s->y[i] * scale;
+        s->hit[i] = fabs(x) <= half_width && fabs(y) <= half_height ? 1 : 0;
+        s->u[i] = half_width - 0.5 + x;
+        s->v[i] = half_height - 0.5 - y;
+        s->position[0][i] = x;
+        s->position[1][i] = y;
+        s->position[2][i] = 0;
+        set_axes(s, i, 0, 0, 1);
+        if (eye > 0)
+            set_eye(s, i, -s->x[i], -s->y[i], eye);
+        else
+            set_eye(s, i, 0, 0, 1);
+    }
+}
+
+/* Where the ray of a pixel meets the unit sphere; false beside it. */
+static bool meet_sphere(const weft_preview_setup *setup, double px, double py, double n[3])
+{
+    const double d = setup->eye_distance;
+    const double x = px / setup->radius_px, y = py / setup->radius_px;
+    if (d <= 0) {
+        const double rest = 1 - x * x - y * y;
+        n[0] = x;
+        n[1] = y;
+        n[2] = rest > 0 ? sqrt(rest) : 0;
+        return rest > 0;
+    }
+    /* eye at (0, 0, d), ray (x t, y t, -1) with t the tangent of the outline's half angle */
+    const double t = 1 / sqrt(d * d - 1), rx = x * t, ry = y * t;
+    const double a = rx * rx + ry * ry + 1, root = d * d - a * (d * d - 1);
+    if (root <= 0)
+        return false;
+    const double along = (d - sqrt(root)) / a;
+    n[0] = rx * along;
+    n[1] = ry * along;
+    n[2] = d - along;
+    return true;
+}
+
+static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    const double radius = setup->radius_texels, eye = setup->eye_distance;
+    for (int i = 0; i < s->n; i++) {
+        double n[3] = {0, 0, 1};
+        s->hit[i] = meet_sphere(setup, s->x[i], s->y[i], n) ? 1 : 0;
+        const double sine = sqrt(n[0] * n[0] + n[1] * n[1]);
+        const double arc = sine > 1e-9 ? radius * atan2(sine, n[2]) / sine : radius;
+        s->u[i] = setup->crop.width / 2.0 - 0.5 + n[0] * arc;
+        s->v[i] = setup->crop.height / 2.0 - 0.5 - n[1] * arc;
+        for (int c = 0; c < 3; c++)
+            s->position[c][i] = n[c] * radius;
+        set_axes(s, i, n[0], n[1], n[2]);
+        if (eye > 0)
+            set_eye(s, i, -n[0], -n[1], eye - n[2]);
+        else
+            set_eye(s, i, 0, 0, 1);
+    }
+}
+
+void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    if (setup->view->shape == WEFT_PREVIEW_PLANE)
+        hit_plane(setup, s);
+    else
+        hit_sphere(setup, s);
+}

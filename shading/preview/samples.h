@@ -1,0 +1,52 @@
+/** Inside of the preview: a run of samples of one row, planar, and the steps that fill it. */
+#ifndef WEFT_SHADING_PREVIEW_SAMPLES_H
+#define WEFT_SHADING_PREVIEW_SAMPLES_H
+
+#include "shading/preview/preview.h"
+
+#define WEFT_PREVIEW_RUN 128 /* samples in a run: all planes together stay in the second-level cache */
+
+typedef struct weft_preview_samples {
+    int n;
+    double x[WEFT_PREVIEW_RUN], y[WEFT_PREVIEW_RUN]; /* in output pixels from the middle, y up */
+    double hit[WEFT_PREVIEW_RUN];                    /* 1 on the sample, 0 on the background */
+    double u[WEFT_PREVIEW_RUN], v[WEFT_PREVIEW_RUN]; /* map pixels, before repeating */
+    double position[3][WEFT_PREVIEW_RUN];            /* map pixels from the middle of plane or sphere */
+    double axis[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the shape */
+    double eye[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the viewer */
+    double normal[3][WEFT_PREVIEW_RUN];              /* tangent space, from the map */
+    double param[WEFT_BRDF_MAX_PLANES][WEFT_PREVIEW_RUN];
+    double light[3][WEFT_PREVIEW_RUN], view[3][WEFT_PREVIEW_RUN]; /* local frame of the shading normal */
+    double irradiance[WEFT_PREVIEW_RUN];                          /* share of the light's, with the cosine */
+    double value[3][WEFT_PREVIEW_RUN];                            /* BRDF, then radiance */
+} weft_preview_samples;
+
+/** The part of the map that is shown: the box around the mask. */
+typedef struct weft_preview_crop {
+    int x, y, width, height;
+} weft_preview_crop;
+
+/** What is the same for all samples of a picture. */
+typedef struct weft_preview_setup {
+    const weft_preview_surface *surface;
+    const weft_preview_view *view;
+    weft_preview_crop crop;
+    int supersampling;    /* samples along a side of a pixel; even */
+    double texels_per_px; /* plane: map pixels an output pixel; sphere: at the pole */
+    double radius_px;     /* sphere: of its outline, output pixels */
+    double radius_texels; /* sphere: of the sphere, map pixels */
+    double eye_distance;  /* 0: orthographic; plane: output pixels, sphere: radii */
+    int albedo_plane;     /* first plane of the parameter "albedo"; -1 when the model has none */
+    double low[WEFT_BRDF_MAX_PLANES], high[WEFT_BRDF_MAX_PLANES]; /* ranges of the parameters */
+} weft_preview_setup;
+
+/** Scale, camera and sampling density of the view. */
+void weft_preview_setup_shape(weft_preview_setup *setup);
+
+/** Fills hit, u, v, position, axis and eye from x and y. */
+void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s);
+
+/** Fills normal and param from u and v; takes masked places off hit. */
+void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s);
+
+#endif

@@ -1,0 +1,318 @@
+/* The preview against closed forms: where it is bright, how bright, and which way round. */
+#include "tests/support/support.h"
+
+#include "core/parallel.h"
+#include "shading/brdf/half.h"
+#include "shading/preview/preview.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static weft_image constant_image(int width, int height, double a, double b, double c)
+{
+    weft_image image;
+    const double values[3] = {a, b, c};
+    assert_ok(weft_image_init(&image, width, height, 3, err));
+    for (int p = 0; p < 3; p++)
+        for (size_t i = 0; i < weft_image_plane_size(&image); i++)
+            weft_image_plane(&image, p)[i] = (float)values[p];
+    return image;
+}
+
+static weft_preview_surface surface_of(const char *brdf, int width, int height)
+{
+    weft_preview_surface surface = {.width = width, .height = height};
+    assert_ok(weft_brdf_find(brdf, &surface.brdf, err));
+    weft_brdf_defaults(surface.brdf, surface.params);
+    return surface;
+}
+
+static weft_preview_view view_of(int width, int height, double azimuth_deg, double elevation_deg)
+{
+    weft_preview_view view = weft_preview_view_defaults();
+    view.width = width;
+    view.height = height;
+    weft_preview_direction(azimuth_deg, elevation_deg, view.light.direction);
+    return view;
+}
+
+static double pixel(const weft_image *image, int plane, int x, int y)
+{
+    return (double)weft_image_row(image, plane, y)[x];
+}
+
+/* Lambert under a distant light: albedo/pi E sin(elevation), to the edge of the picture. */
+static void test_flat_plane(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 40, 30);
+    weft_preview_view view = view_of(40, 30, 70, 30);
+    weft_image albedo = constant_image(40, 30, 0.8, 0.4, 0.1), picture;
+    const double irradiance[3] = {3, 2, 1}, albedos[3] = {0.8, 0.4, 0.1};
+    memcpy(view.light.irradiance, irradiance, sizeof irradiance);
+    view.exposure_ev = 1;
+    view.ambient = 0.25;
+    assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int c = 0; c < 3; c++)
+        for (int y = 0; y < 30; y++)
+            for (int x = 0; x < 40; x++)
+                assert_near(pixel(&picture, c, x, y), 2 * albedos[c] * (irradiance[c] / WEFT_PI * 0.5 + 0.25),
+                            2e-6);
+    weft_image_fini(&picture);
+    weft_image_fini(&albedo);
+}
+
+/* A point light: E D^2/r^2 cos at each place, in mm. */
+static void test_point_light(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 100, 100);
+    weft_preview_view view = view_of(100, 100, 0, 0);
+    const double p[3] = {30, -20, 40};
+    weft_image picture;
+    surface.mm_per_px = 0.5;
+    view.light.is_point = true;
+    memcpy(view.light.position_mm, p, sizeof p);
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int y = 5; y < 100; y += 30)
+        for (int x = 5; x < 100; x += 30) {
+            const double at[2] = {(x - 49.5) * 0.5, (49.5 - y) * 0.5};
+            const double r2 = pow(p[0] - at[0], 2) + pow(p[1] - at[1], 2) + p[2] * p[2];
+            const double d2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+            assert_near(pixel(&picture, 0, x, y), 0.5 * d2 / r2 * p[2] / sqrt(r2), 1e-3);
+        }
+    weft_image_fini(&picture);
+}
+
+/* Slopes to the right and upwards brighten under light from there: n.l exactly. */
+static void test_slopes_face_their_light(void **state)
+{
+    (void)state;
+    static const struct {
+        double slope[3], azimuth;
+    } cases[] = {{{0.5, 0, 0.8660254}, 0},
+                 {{0.5, 0, 0.8660254}, 180},
+                 {{0, 0.5, 0.8660254}, 90},
+                 {{0, 0.5, 0.8660254}, 270}};
+    for (int i = 0; i < 4; i++) {
+        const double *const n = cases[i].slope;
+        weft_preview_surface surface = surface_of("lambert", 16, 16);
+        weft_preview_view view = view_of(16, 16, cases[i].azimuth, 40);
+        weft_image normal = constant_image(16, 16, n[0], n[1], n[2]), picture;
+        surface.normal = &normal;
+        assert_ok(weft_preview_render(&surface, &view, &picture, err));
+        const double side = (i % 2 ? -0.5 : 0.5) * cos(40 * WEFT_PI / 180);
+        assert_near(pixel(&picture, 1, 8, 8), 0.5 * (side + 0.8660254 * sin(40 * WEFT_PI / 180)), 1e-6);
+        weft_image_fini(&picture);
+        weft_image_fini(&normal);
+    }
+}
+
+static void test_picture_is_the_right_way_up(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 40, 20);
+    weft_preview_view view = view_of(80, 80, 0, 90); /* the map lies in the middle, 80 x 40 */
+    weft_image albedo = constant_image(40, 20, 0, 0, 0.5), picture;
+    view.background = 0.07;
+    for (int y = 0; y < 10; y++)
+        for (int x = 0; x < 20; x++)
+            weft_image_row(&albedo, 0, y)[x] = 1; /* red at the top left */
+    assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    assert_near(pixel(&picture, 0, 5, 25), 1, 1e-6);
+    assert_near(pixel(&picture, 0, 5, 55), 0, 1e-6);
+    assert_near(pixel(&picture, 0, 75, 25), 0, 1e-6);
+    assert_near(pixel(&picture, 2, 75, 55), 0.5, 1e-6);
+    assert_near(pixel(&picture, 2, 40, 10), 0.07, 1e-6);
+    assert_near(pixel(&picture, 2, 40, 70), 0.07, 1e-6);
+    weft_image_fini(&picture);
+    weft_image_fini(&albedo);
+}
+
+/* n.l on the ball, dark behind the terminator, for both cameras. */
+static void test_sphere_terminator(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 64, 64);
+    for (int perspective = 0; perspective < 2; perspective++) {
+        weft_preview_view view = view_of(200, 200, 0, 0); /* from +X, in the plane of the picture */
+        weft_image picture;
+        view.shape = WEFT_PREVIEW_SPHERE;
+        view.fov_deg = perspective ? 30 : 0;
+        assert_ok(weft_preview_render(&surface, &view, &picture, err));
+        for (int y = 0; y < 200; y++)
+            for (int x = 0; x < 200; x++) {
+                const double px = (x - 99.5) / 92, py = (99.5 - y) / 92, r = sqrt(px * px + py * py);
+                if (r > 1.03)
+                    assert_near(pixel(&picture, 0, x, y), 0.18, 1e-6);
+                if (r < 0.95 && px < -0.02)
+                    assert_near(pixel(&picture, 0, x, y), 0, 1e-6);
+                if (r < 0.95 && px > 0.02 && !perspective)
+                    assert_near(pixel(&picture, 0, x, y), 0.5 * px, 1e-3);
+                if (r < 0.95 && px > 0.02 &&
+                    perspective) /* nearer to the eye the same pixel shows more side */
+                    assert_true(pixel(&picture, 0, x, y) < 0.5 * px + 1e-3 &&
+                                pixel(&picture, 0, x, y) > 0.35 * px);
+            }
+        weft_image_fini(&picture);
+    }
+}
+
+/* On the ball the map repeats mirrored, and so must the slope; the frame follows the surface. */
+static void test_sphere_mirrors_normals(void **state)
+{
+    (void)state;
+    enum { SIZE = 300 };
+    weft_preview_surface surface = surface_of("lambert", 64, 64);
+    weft_preview_view view = view_of(SIZE, SIZE, 20, 60);
+    weft_image normal = constant_image(64, 64, 0.28, 0, 0.96), picture;
+    const double *const l = view.light.direction;
+    view.shape = WEFT_PREVIEW_SPHERE;
+    view.repeat = 4; /* a tile is an arc of 45 degrees: the first edge is at 22.5 degrees */
+    surface.normal = &normal;
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    const double radius = 0.92 * SIZE / 2;
+    for (int degrees = -60; degrees <= 60; degrees += 10) {
+        const double angle = degrees * WEFT_PI / 180;
+        const bool mirrored = abs(degrees) > 22 && abs(degrees) < 68;
+        const double slope = mirrored ? -0.28 : 0.28;
+        /* along the equator the frame turns about Y: n = slope (cos, 0, -sin) + 0.96 (sin, 0, cos) */
+        const double n[3] = {slope * cos(angle) + 0.96 * sin(angle), 0,
+                             -slope * sin(angle) + 0.96 * cos(angle)};
+        const double nl = n[0] * l[0] + n[2] * l[2];
+        const double g = fmin((sin(angle) * l[0] + cos(angle) * l[2]) / (nl * 0.96), 1);
+        const double wanted = 0.5 * nl * (g + g * g - g * g * g); /* with the soft terminator */
+        const int x = (int)lround(SIZE / 2.0 - 0.5 + radius * sin(angle));
+        const double got = 0.5 * (pixel(&picture, 0, x, SIZE / 2 - 1) + pixel(&picture, 0, x, SIZE / 2));
+        if (wanted > 0.1)
+            assert_near(got, wanted, 0.012); /* half a pixel is up to 0.7 degrees there */
+    }
+    weft_image_fini(&picture);
+    weft_image_fini(&normal);
+}
+
+/* The highlight of a flat shiny plane is where the half vector is the normal: x = distance/tan(elevation). */
+static void test_perspective_highlight(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("ggx-specular", 100, 100);
+    weft_preview_view view = view_of(200, 200, 180, 75);
+    weft_image picture;
+    int brightest = 0;
+    assert_ok(weft_brdf_set(surface.brdf, "alpha=0.05", surface.params, err));
+    view.fov_deg = 50;
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int x = 0; x < 200; x++)
+        if (pixel(&picture, 0, x, 100) > pixel(&picture, 0, brightest, 100))
+            brightest = x;
+    const double distance = 100 / tan(25 * WEFT_PI / 180);
+    assert_near(brightest - 99.5, -distance / tan(75 * WEFT_PI / 180), 1);
+    weft_image_fini(&picture);
+}
+
+static void test_mask_shows_the_background(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 60, 60);
+    weft_preview_view view = view_of(40, 40, 0, 90);
+    weft_image albedo = constant_image(60, 60, 0.6, 0.6, 0.6), picture;
+    weft_mask mask;
+    assert_ok(weft_mask_init(&mask, 60, 60, 0, err));
+    for (int y = 0; y < 60; y++)
+        for (int x = 0; x < 60; x++) {
+            const bool in = x >= 10 && x < 50 && y >= 10 && y < 50 && !(x < 20 && y < 20);
+            mask.data[y * 60 + x] = in ? 255 : 0;
+            for (int c = 0; c < 3 && !in; c++)
+                weft_image_row(&albedo, c, y)[x] = NAN; /* must not leak in */
+        }
+    surface.mask = &mask;
+    assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
+    assert_ok(weft_preview_render(&surface, &view, &picture, err)); /* the box of the mask fills it */
+    assert_near(pixel(&picture, 0, 3, 3), 0.18, 1e-6);
+    assert_near(pixel(&picture, 0, 39, 0), 0.6, 1e-6);
+    assert_near(pixel(&picture, 0, 12, 30), 0.6, 1e-6);
+    memset(mask.data, 0, 3600);
+    assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_NODATA, "mask is empty");
+    weft_mask_fini(&mask);
+    weft_image_fini(&picture);
+    weft_image_fini(&albedo);
+}
+
+/* Stripes as fine as the samples come out grey, not as slow waves. */
+static void test_fine_weaves_do_not_beat(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 1000, 200);
+    weft_preview_view view = view_of(317, 60, 0, 90);
+    weft_image albedo = constant_image(1000, 200, 0, 0, 0), picture;
+    for (int c = 0; c < 3; c++)
+        for (int y = 0; y < 200; y++)
+            for (int x = 0; x < 1000; x++)
+                weft_image_row(&albedo, c, y)[x] = (float)(x / 2 % 2); /* 1.27 pixels a period */
+    assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int x = 10; x < 307; x++)
+        assert_near(pixel(&picture, 0, x, 30), 0.5, 0.04);
+    weft_image_fini(&picture);
+    weft_image_fini(&albedo);
+}
+
+static void test_threads_do_not_change_it(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("cloth", 50, 50);
+    weft_preview_view view = view_of(120, 90, 30, 20);
+    weft_image one, three;
+    view.shape = WEFT_PREVIEW_SPHERE;
+    weft_parallel_set_threads(1);
+    assert_ok(weft_preview_render(&surface, &view, &one, err));
+    weft_parallel_set_threads(3);
+    assert_ok(weft_preview_render(&surface, &view, &three, err));
+    weft_parallel_set_threads(0);
+    assert_memory_equal(one.data, three.data, sizeof(float) * 3 * 120 * 90);
+    weft_image_fini(&one);
+    weft_image_fini(&three);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 20, 20);
+    weft_preview_view view = view_of(10, 10, 0, 90);
+    weft_image small = constant_image(10, 20, 0, 0, 1), picture;
+    assert_fails(weft_preview_set_map(&surface, "albedo", &small, err), WEFT_ERR_MISMATCH, "10 x 20");
+    assert_fails(weft_preview_set_map(&surface, "alpha", &small, err), WEFT_ERR_USAGE, "no parameter alpha");
+    surface.normal = &small;
+    assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_MISMATCH, "normal map");
+    surface.normal = NULL;
+    view.light.is_point = true;
+    assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_MISSING, "no");
+    view.light.is_point = false;
+    view.repeat = 0;
+    assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_RANGE, "repeat");
+    view.repeat = 1;
+    view.width = 0;
+    assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_RANGE, "0 x 10");
+    weft_image_fini(&small);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_flat_plane),
+        cmocka_unit_test(test_point_light),
+        cmocka_unit_test(test_slopes_face_their_light),
+        cmocka_unit_test(test_picture_is_the_right_way_up),
+        cmocka_unit_test(test_sphere_terminator),
+        cmocka_unit_test(test_sphere_mirrors_normals),
+        cmocka_unit_test(test_perspective_highlight),
+        cmocka_unit_test(test_mask_shows_the_background),
+        cmocka_unit_test(test_fine_weaves_do_not_beat),
+        cmocka_unit_test(test_threads_do_not_change_it),
+        cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
