@@ -2,7 +2,7 @@
 
 #include "tests/support/support.h"
 
-#include "core/file.h"
+#include "core/csv.h"
 #include "core/mem.h"
 #include "core/text.h"
 
@@ -10,45 +10,20 @@
 #include <stdio.h>
 #include <string.h>
 
-static char *next_cell(char **cursor)
-{
-    char *const cell = *cursor;
-    char *p = cell;
-    while (*p && *p != ',' && *p != '\n' && *p != '\r')
-        p++;
-    const char stop = *p;
-    *p = 0;
-    *cursor = stop == '\r' ? p + 2 : stop ? p + 1 : p;
-    return cell;
-}
-
 void table_read(table *t, const char *name)
 {
-    const char *const path = weft_test_need_shared(name);
-    char *text = NULL;
-    size_t n = 0;
-    assert_ok(weft_file_read(path, (size_t)16 << 20, &text, &n, err));
-    memset(t, 0, sizeof *t);
-    int lines = 0;
-    for (const char *p = text; *p; p++)
-        lines += *p == '\n';
-    if (n && text[n - 1] != '\n')
-        lines++;
-    char *const first_end = text + strcspn(text, "\r\n");
-    t->columns = 1;
-    for (const char *p = text; p < first_end; p++)
-        t->columns += *p == ',';
+    weft_csv csv;
+    assert_ok(weft_csv_read(weft_test_need_shared(name), &csv, err));
+    *t = (table){.columns = csv.columns, .rows = csv.rows};
     assert_true(t->columns <= TABLE_MAX_COLUMNS);
-    t->rows = lines - 1;
     t->cells = weft_alloc((size_t)t->rows * (size_t)t->columns, sizeof *t->cells, NULL);
     assert_non_null(t->cells);
-    char *cursor = text;
     for (int c = 0; c < t->columns; c++)
-        snprintf(t->names[c], sizeof t->names[c], "%s", next_cell(&cursor));
+        snprintf(t->names[c], sizeof t->names[c], "%s", csv.names[c]);
     for (int i = 0; i < t->rows * t->columns; i++)
-        if (!weft_text_to_double(next_cell(&cursor), &t->cells[i]))
+        if (!weft_text_to_double(csv.cells[i], &t->cells[i]))
             t->cells[i] = (double)NAN;
-    weft_free(text);
+    weft_csv_fini(&csv);
 }
 
 void table_free(table *t)
