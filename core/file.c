@@ -216,7 +216,9 @@ weft_err weft_atomic_folder_begin(weft_atomic *a, const char *path, bool force, 
     WEFT_TRY(weft_file_refuse_existing(path, force, err));
     WEFT_TRY(make_names(&begun, path, err));
     weft_err status = weft_folder_remove(begun.temp_path, err);
-    if (status == WEFT_OK && mkdir(begun.temp_path, 0777) != 0)
+    if (status != WEFT_OK)
+        weft_prefix(err, status, "%s", path);
+    else if (mkdir(begun.temp_path, 0777) != 0)
         status = weft_fail_errno(
             err, WEFT_ERR_IO, "%s: cannot be created; check that its parent folder is there and yours", path);
     if (status != WEFT_OK) {
