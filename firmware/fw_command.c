@@ -1,0 +1,122 @@
+#include "firmware/fw_command.h"
+
+#include "firmware/fw_board.h"
+#include "firmware/fw_config.h"
+#include "firmware/fw_light.h"
+#include "firmware/fw_link.h"
+#include "firmware/fw_safety.h"
+
+#include <string.h>
+
+_Static_assert(sizeof FW_GIT_ID - 1 <= sizeof(((weft_hello_reply *)0)->git_id), "FW_GIT_ID is too long");
+
+static uint8_t run_hello(const weft_hello_request *request, weft_hello_reply *reply)
+{
+    *reply = (weft_hello_reply){
+        .magic = WEFT_PROTOCOL_MAGIC,
+        .proto_major = WEFT_PROTOCOL_MAJOR,
+        .proto_minor = WEFT_PROTOCOL_MINOR,
+        .fw_version = {FW_VERSION_MAJOR, FW_VERSION_MINOR, FW_VERSION_PATCH},
+        .capabilities = WEFT_CAPABILITY_DIMMING,
+        .n_lights = FW_N_LIGHTS,
+        .level_max = FW_LEVEL_MAX,
+        .tick_hz = FW_TICK_HZ,
+        .max_on_ms = FW_MAX_ON_MS,
+        .max_steps = FW_MAX_STEPS,
+        .rx_window = FW_RX_RING - 1,
+        .reset_cause = fw_board_reset_cause(),
+        .boot_nonce = fw_safety_hello(request->salt),
+        .settings_state = WEFT_SETTINGS_DEFAULTS,
+    };
+    memcpy(reply->git_id, FW_GIT_ID, sizeof FW_GIT_ID - 1);
+    return WEFT_STATUS_OK;
+}
+
+static uint8_t run_status(const weft_status_request *request, weft_status_reply *reply)
+{
+    (void)request;
+    *reply = (weft_status_reply){
+        .state = fw_safety_state(),
+        .safe_cause = fw_safety_cause(),
+        .lights = fw_light_mask(),
+        .level = fw_light_level(),
+        .ticks = fw_board_ticks(),
+        .lease_left_ms = fw_safety_lease_left_ms(),
+        .on_left_ms = fw_light_left_ms(),
+        .boot_nonce = fw_safety_boot_nonce(),
+        .frames = fw_link_frames(),
+        .crc_errors = fw_link_crc_errors(),
+        .overruns = fw_link_overruns(),
+        .resets = fw_board_resets(),
+        .max_on_offs = fw_light_max_on_offs(),
+    };
+    return WEFT_STATUS_OK;
+}
+
+static uint8_t run_lease(const weft_lease_request *request, weft_lease_reply *reply)
+{
+    return fw_safety_lease(request->lease_ms, &reply->granted_ms);
+}
+
+static uint8_t run_light(const weft_light_request *request, weft_light_reply *reply)
+{
+    if (request->mask >> FW_N_LIGHTS || request->level > FW_LEVEL_MAX || request->max_on_ms == 0)
+        return WEFT_STATUS_BAD_ARG;
+    if (request->max_on_ms > FW_MAX_ON_MS)
+        return WEFT_STATUS_LIMIT;
+    const uint8_t allowed = fw_safety_allows_light();
+    if (allowed != WEFT_STATUS_OK)
+        return allowed;
+    if (!fw_light_set(request->mask, request->level, request->max_on_ms))
+        return WEFT_STATUS_SAFE_LATCHED;
+    reply->on_tick = fw_light_on_tick();
+    return WEFT_STATUS_OK;
+}
+
+static uint8_t run_off(const weft_off_request *request, weft_off_reply *reply)
+{
+    (void)request;
+    fw_light_off();
+    reply->off_tick = fw_light_off_tick();
+    return WEFT_STATUS_OK;
+}
+
+/* Request bytes to reply bytes, one function per command. */
+#define WEFT_COMMAND(opcode, NAME, name, text)                                                               \
+    static uint8_t command_##name(const weft_frame *frame, uint8_t *bytes)                                   \
+    {                                                                                                        \
+        weft_##name##_request request;                                                                       \
+        weft_##name##_reply reply;                                                                           \
+        weft_##name##_request_decode(frame->payload, frame->n, &request);                                    \
+        const uint8_t status = run_##name(&request, &reply);                                                 \
+        if (status == WEFT_STATUS_OK)                                                                        \
+            weft_##name##_reply_encode(&reply, bytes);                                                       \
+        return status;                                                                                       \
+    }
+#include "firmware/protocol.def"
+
+static const struct {
+    uint8_t opcode, request_bytes, reply_bytes;
+    uint8_t (*run)(const weft_frame *frame, uint8_t *bytes);
+} commands[] = {
+#define WEFT_COMMAND(opcode, NAME, name, text)                                                               \
+    {opcode, WEFT_##NAME##_REQUEST_BYTES, WEFT_##NAME##_REPLY_BYTES, command_##name},
+#include "firmware/protocol.def"
+};
+
+void fw_command_run(weft_frame *frame)
+{
+    uint8_t status = WEFT_STATUS_BAD_CMD, n = 0;
+    for (uint8_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        if (commands[i].opcode != frame->command)
+            continue;
+        status = WEFT_STATUS_BAD_ARG;
+        if (frame->n >= commands[i].request_bytes)
+            status = commands[i].run(frame, frame->payload + 1);
+        if (status == WEFT_STATUS_OK)
+            n = commands[i].reply_bytes;
+    }
+    frame->type = WEFT_FRAME_REPLY;
+    frame->payload[0] = status;
+    frame->n = (uint8_t)(n + 1);
+}
