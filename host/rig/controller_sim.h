@@ -1,6 +1,20 @@
 /**
  * The light controller of the virtual scanner: the firmware ELF on libsimavr, its UART on a pty, its pins
  * read as light.  Everything is measured in simulated time (cycles of the 16 MHz clock).
+ *
+ * It runs in one of two ways:
+ * - paced: an own thread keeps simulated time in step with the wall clock, and a host talks over a pty.
+ *   Opening the pty resets the board, as DTR resets an Uno (without the wait for its bootloader);
+ * - stepped: no thread, no pty; time passes only in weft_controller_sim_run(), thousands of times faster
+ *   than a clock when the board sleeps, and the same way every time.  For tests.
+ *
+ * Where libsimavr differs from the chip, this makes up for it: bytes come one per character time and are
+ * lost when the receiver's three places are taken; pins are driven or dark, also right after a reset.
+ * A character lasts 11 bit times in the simulator (10 on the wire), and a wrong baud rate is not garbled:
+ * weft_controller_sim_get_counters() tells the rate that the firmware has set.
+ *
+ * All functions may be called from any thread, except that a stepped one is for one thread, and that
+ * nothing may be called from inside the trigger callback.
  */
 #ifndef WEFT_HOST_RIG_CONTROLLER_SIM_H
 #define WEFT_HOST_RIG_CONTROLLER_SIM_H
@@ -8,6 +22,7 @@
 #include "core/error.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #define WEFT_SIM_N_LIGHTS 10
@@ -18,10 +33,15 @@ typedef struct weft_controller_sim weft_controller_sim;
  *  @param pty_path  gets the path that a host opens; room for 128 bytes */
 weft_err weft_controller_sim_create(const char *elf_path, weft_controller_sim **sim, char *pty_path,
                                     weft_error *err);
+
+/** Loads the ELF for stepped use; the board has just got its power. */
+weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controller_sim **sim, weft_error *err);
+
 void weft_controller_sim_destroy(weft_controller_sim *sim);
 
 /**
- * Watches the lights over an exposure that begins now, in simulated time, and waits for its end.
+ * Watches the lights over an exposure that begins now, in simulated time, and waits for its end (stepped:
+ * lets that time pass).
  *
  * @param exposure_us    1..10 000 000
  * @param on_fraction    per light: the share of the exposure during which it was on, times its dimming
@@ -30,14 +50,44 @@ void weft_controller_sim_destroy(weft_controller_sim *sim);
 bool weft_controller_sim_expose(weft_controller_sim *sim, uint32_t exposure_us,
                                 double on_fraction[WEFT_SIM_N_LIGHTS]);
 
-/** Which lights are on now, and since when all have been dark (seconds of simulated time; 0 when lit). */
+/** Which lights are on now, and since when all have been dark (seconds of simulated time; 0 when lit).
+ *  A dimmed light counts as on all the time.  dark_for_s may be NULL. */
 uint32_t weft_controller_sim_lights(weft_controller_sim *sim, double *dark_for_s);
 
 /** Resets the board as its button does. */
 void weft_controller_sim_reset(weft_controller_sim *sim);
 
+/** Sends the program into an endless loop, as a mistake in it would; interrupts go on. */
+void weft_controller_sim_hang(weft_controller_sim *sim);
+
 /** Called from the simulator's thread at each rising edge of the camera trigger pin. */
 void weft_controller_sim_set_trigger(weft_controller_sim *sim, void (*on_trigger)(void *context),
                                      void *context);
+
+/** Simulated seconds since power came on. */
+double weft_controller_sim_time_s(weft_controller_sim *sim);
+
+typedef struct weft_controller_sim_counters {
+    unsigned resets;    /* by button, opened port and watchdog */
+    unsigned opened;    /* times that a host opened the pty */
+    unsigned overruns;  /* received bytes that the firmware was too slow for */
+    int most_lights;    /* the most lights that ever shone at the same moment */
+    double bits_per_s;  /* as the firmware has set it */
+    double simulated_s; /* since power came on */
+    bool running;       /* false when the program has crashed the simulator */
+} weft_controller_sim_counters;
+
+void weft_controller_sim_get_counters(weft_controller_sim *sim, weft_controller_sim_counters *counters);
+
+/* -- stepped use ---------------------------------------------------------------------------------------- */
+
+/** Lets simulated time pass.  @return false when the simulator has stopped */
+bool weft_controller_sim_run(weft_controller_sim *sim, double microseconds);
+
+/** Queues bytes for the board, which get there one per character time; at most 64 KiB wait. */
+void weft_controller_sim_send(weft_controller_sim *sim, const uint8_t *bytes, size_t n);
+
+/** Takes what the board has sent.  @return number of bytes, at most `room` */
+size_t weft_controller_sim_receive(weft_controller_sim *sim, uint8_t *bytes, size_t room);
 
 #endif
