@@ -1,0 +1,174 @@
+#include "host/rig/tracer.h"
+
+#include "calibration/lens/lens_model.h"
+#include "core/parallel.h"
+
+#include <math.h>
+
+weft_rig_projection weft_rig_project_to_plate(const weft_rig_plate *plate, weft_vec3 centre)
+{
+    /* The ray C + s (g - C) meets the plate at s = n.(o - C) / n.(g - C); its plate coordinate along axis a
+       is a.(C - o) + s a.(g - C).  With g = (gx, gy, 0) numerator and denominator are affine in gx, gy. */
+    const weft_vec3 n = plate->normal, to_plate = weft_sub(plate->centre, centre);
+    const double distance = weft_dot(n, to_plate), through = weft_dot(n, centre);
+    const weft_vec3 axes[2] = {plate->ax, plate->ay};
+    weft_rig_projection p;
+    for (int i = 0; i < 2; i++) {
+        const weft_vec3 a = axes[i];
+        const double offset = -weft_dot(a, to_plate);
+        p.h[3 * i] = offset * n.x + distance * a.x;
+        p.h[3 * i + 1] = offset * n.y + distance * a.y;
+        p.h[3 * i + 2] = -offset * through - distance * weft_dot(a, centre);
+    }
+    p.h[6] = n.x;
+    p.h[7] = n.y;
+    p.h[8] = -through;
+    return p;
+}
+
+weft_rig_tracer weft_rig_tracer_make(const weft_rig_sample *sample, weft_vec3 centre)
+{
+    weft_rig_tracer tracer = {.sample = sample,
+                              .centre = {(float)centre.x, (float)centre.y, (float)centre.z}};
+    if (sample->has_plate)
+        tracer.to_plate = weft_rig_project_to_plate(&sample->plate, centre);
+    return tracer;
+}
+
+static void hit_table(weft_rig_hit *hit, float gx, float gy)
+{
+    *hit = (weft_rig_hit){.x = gx, .y = gy, .nz = 1, .tx = 1, .strength = 1, .openness = 1};
+}
+
+static void trace_plate(const weft_rig_tracer *tracer, float gx, float gy, weft_rig_hit *hit)
+{
+    const weft_rig_plate *const plate = &tracer->sample->plate;
+    double x, y;
+    weft_rig_plate_coordinates(&tracer->to_plate, (double)gx, (double)gy, &x, &y);
+    const int material = weft_rig_plate_material(plate, x, y);
+    hit_table(hit, gx, gy);
+    if (material == 0)
+        return;
+    const weft_vec3 point = weft_rig_plate_point(plate, x, y);
+    hit->x = (float)point.x;
+    hit->y = (float)point.y;
+    hit->z = (float)point.z;
+    hit->nx = (float)plate->normal.x;
+    hit->ny = (float)plate->normal.y;
+    hit->nz = (float)plate->normal.z;
+    hit->material = material;
+}
+
+static void trace_cloth(const weft_rig_tracer *tracer, const weft_cloth_patch *patch, float gx, float gy,
+                        weft_rig_hit *hit)
+{
+    const float *const c = tracer->centre;
+    const float dx = (c[0] - gx) / c[2], dy = (c[1] - gy) / c[2];
+    weft_cloth_point *const point = &hit->cloth;
+    weft_cloth_meet(&tracer->sample->cloth, patch, gx, gy, dx, dy, point);
+    const float z = point->height;
+    const float scale = 1 / sqrtf(1 + point->slope_x * point->slope_x + point->slope_y * point->slope_y);
+    hit->x = gx + z * dx;
+    hit->y = gy + z * dy;
+    hit->z = z;
+    hit->nx = -point->slope_x * scale;
+    hit->ny = -point->slope_y * scale;
+    hit->nz = scale;
+    /* The fibre lies in the surface: its level direction, lifted by the slope along it. */
+    const float rise = point->slope_x * point->fibre_x + point->slope_y * point->fibre_y;
+    const float level = 1 / sqrtf(1 + rise * rise);
+    hit->tx = point->fibre_x * level;
+    hit->ty = point->fibre_y * level;
+    hit->tz = rise * level;
+    hit->strength = point->strength;
+    hit->openness = point->openness;
+    hit->material = point->dye;
+}
+
+void weft_rig_trace(const weft_rig_tracer *tracer, const weft_cloth_patch *patch, float gx, float gy,
+                    weft_rig_hit *hit)
+{
+    if (tracer->sample->has_cloth)
+        trace_cloth(tracer, patch, gx, gy, hit);
+    else if (tracer->sample->has_plate)
+        trace_plate(tracer, gx, gy, hit);
+    else
+        hit_table(hit, gx, gy);
+}
+
+/* ------------------------------------------------------------------------------------------ views */
+
+typedef struct view_job {
+    weft_rig_view *view;
+    const weft_camera *camera;
+} view_job;
+
+static void sensor_rows(void *context, int band, int begin, int end)
+{
+    (void)band;
+    const view_job *const job = context;
+    for (int v = begin; v < end; v++)
+        for (int u = 0; u < job->camera->width; u++) {
+            weft_vec3 point = {0};
+            (void)weft_camera_to_plane(job->camera, u, v, 0, &point);
+            weft_image_row(&job->view->ground, 0, v)[u] = (float)point.x;
+            weft_image_row(&job->view->ground, 1, v)[u] = (float)point.y;
+        }
+}
+
+weft_err weft_rig_view_sensor(weft_rig_view *view, const weft_rig_scene *scene, weft_error *err)
+{
+    *view = (weft_rig_view){.centre = weft_camera_centre(&scene->camera)};
+    WEFT_TRY(weft_image_init(&view->ground, scene->camera.width, scene->camera.height, 2, err));
+    view_job job = {view, &scene->camera};
+    weft_parallel_rows(scene->camera.height, sensor_rows, &job);
+    return WEFT_OK;
+}
+
+weft_err weft_rig_view_plane(weft_rig_view *view, const weft_rig_scene *scene, double mm_per_px,
+                             weft_error *err)
+{
+    const weft_camera *const camera = &scene->camera;
+    weft_vec3 middle[4];
+    const double right = camera->width - 1, bottom = camera->height - 1;
+    const double at[4][2] = {{0, bottom / 2}, {right, bottom / 2}, {right / 2, 0}, {right / 2, bottom}};
+    for (int i = 0; i < 4; i++)
+        if (!weft_camera_to_plane(camera, at[i][0], at[i][1], 0, &middle[i]))
+            return weft_fail(err, WEFT_ERR_RANGE, "the camera does not see the table");
+    const double half_width = fmin(-middle[0].x, middle[1].x), half_height = fmin(middle[2].y, -middle[3].y);
+    const double columns = floor(2 * half_width / mm_per_px), rows = floor(2 * half_height / mm_per_px);
+    if (!(columns >= 1 && rows >= 1 && columns <= WEFT_IMAGE_MAX_SIDE && rows <= WEFT_IMAGE_MAX_SIDE))
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "a grid of %g mm per pixel does not fit the field of %.0f x %.0f mm", mm_per_px,
+                         2 * half_width, 2 * half_height);
+    *view = (weft_rig_view){.centre = weft_camera_centre(camera)};
+    WEFT_TRY(weft_image_init(&view->ground, (int)columns, (int)rows, 2, err));
+    for (int v = 0; v < view->ground.height; v++)
+        for (int u = 0; u < view->ground.width; u++) {
+            weft_image_row(&view->ground, 0, v)[u] = (float)((u - (columns - 1) / 2) * mm_per_px);
+            weft_image_row(&view->ground, 1, v)[u] = (float)(((rows - 1) / 2 - v) * mm_per_px);
+        }
+    return WEFT_OK;
+}
+
+void weft_rig_view_fini(weft_rig_view *view)
+{
+    weft_image_fini(&view->ground);
+}
+
+/* Central differences inside, one-sided at the frame's edge. */
+weft_rig_footprint weft_rig_footprint_at(const weft_rig_view *view, int u, int v)
+{
+    const weft_image *const g = &view->ground;
+    const int u0 = u > 0 ? u - 1 : u, u1 = u + 1 < g->width ? u + 1 : u;
+    const int v0 = v > 0 ? v - 1 : v, v1 = v + 1 < g->height ? v + 1 : v;
+    const float su = u1 > u0 ? 1.0F / (float)(u1 - u0) : 0, sv = v1 > v0 ? 1.0F / (float)(v1 - v0) : 0;
+    weft_rig_footprint f;
+    f.x = weft_image_row(g, 0, v)[u];
+    f.y = weft_image_row(g, 1, v)[u];
+    for (int c = 0; c < 2; c++) {
+        f.du[c] = su * (weft_image_row(g, c, v)[u1] - weft_image_row(g, c, v)[u0]);
+        f.dv[c] = sv * (weft_image_row(g, c, v1)[u] - weft_image_row(g, c, v0)[u]);
+    }
+    return f;
+}
