@@ -14,7 +14,7 @@
 #include <stdbool.h>
 
 #define WEFT_CALIBRATION_VERSION 1
-#define WEFT_LIGHTS_MAX          32
+#define WEFT_LIGHTS_MAX          128 /* the largest open benchmark sets have 100 */
 
 /** Pinhole camera with OpenCV's distortion, and its pose over the sample plane. */
 typedef struct weft_camera {

@@ -15,6 +15,14 @@
 #define WEFT_CLONES
 #endif
 
+/** Before a helper that such a function calls: it becomes part of each copy, where a plain call would stay
+ *  at the lowest level. */
+#if defined(__GNUC__)
+#define WEFT_INLINE static inline __attribute__((always_inline))
+#else
+#define WEFT_INLINE static inline
+#endif
+
 /** Before a loop: no iteration reads what another one writes (the planes do not overlap), so that the
  *  compiler need not check every pair of pointers, which it gives up above a handful. */
 #if defined(__GNUC__) && !defined(__clang__)

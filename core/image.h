@@ -15,7 +15,7 @@
 
 /** Refused above this: a header that claims more is damaged (the largest medium-format backs have 15000). */
 #define WEFT_IMAGE_MAX_SIDE   32768
-#define WEFT_IMAGE_MAX_PLANES 64
+#define WEFT_IMAGE_MAX_PLANES 384 /* a gain map of 128 lights in three channels */
 
 typedef struct weft_image {
     int width, height, planes;
