@@ -1,10 +1,16 @@
 #include "host/cli/command.h"
 
 extern const weft_command weft_cmd_brdf;
+extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
+extern const weft_command weft_cmd_import;
+extern const weft_command weft_cmd_solve;
 
 /* In the order of the help: the way of the data, from the lights to the picture. */
 const weft_command *const weft_commands[] = {
+    &weft_cmd_import,
+    &weft_cmd_solve,
+    &weft_cmd_compare,
     &weft_cmd_brdf,
     &weft_cmd_completion,
     NULL,

@@ -1,0 +1,267 @@
+#include "host/solve/solve.h"
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "host/solve/info.h"
+#include "host/solve/light_plates.h"
+#include "host/solve/rectify.h"
+#include "host/solve/solve_row.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Rows of solved pixels that are demosaiced together; a multiple of WEFT_BAND_ROWS. */
+enum { BAND = 4 * WEFT_BAND_ROWS };
+
+weft_err weft_solve_find_method(const char *name, const weft_solve_method **method, weft_error *err)
+{
+    char known[256] = "";
+    for (const weft_solve_method *m = weft_solve_methods; m->name; m++) {
+        if (strcmp(m->name, name) == 0) {
+            *method = m;
+            return WEFT_OK;
+        }
+        const size_t used = strlen(known);
+        snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", m->name);
+    }
+    return weft_fail(err, WEFT_ERR_USAGE, "there is no method \"%s\" (there are: %s)", name, known);
+}
+
+static bool has_near_light(const weft_calibration *cal)
+{
+    for (int j = 0; j < cal->n_lights; j++)
+        if (!cal->lights[j].distant)
+            return true;
+    return false;
+}
+
+weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
+                          const weft_solve_options *options, weft_error *err)
+{
+    const unsigned pose = WEFT_CALIBRATION_CAMERA | WEFT_CALIBRATION_POSE;
+    WEFT_TRY(weft_set_require_lights(set, err));
+    WEFT_TRY(weft_calibration_require(cal, WEFT_CALIBRATION_LIGHTS, cal_folder, err));
+    if (options->plane_geometry || has_near_light(cal))
+        WEFT_TRY(weft_calibration_require(cal, pose, cal_folder, err));
+    const int n = weft_set_n_lights(set);
+    if (n != cal->n_lights)
+        return weft_fail(err, WEFT_ERR_MISMATCH,
+                         "%s has %d lights but the calibration %s has %d (use the calibration of the scanner "
+                         "that took the set)",
+                         set->folder, n, cal_folder, cal->n_lights);
+    if (cal->has_camera)
+        WEFT_TRY(weft_calibration_require_size(cal, set->width, set->height, cal_folder, err));
+    return WEFT_OK;
+}
+
+/* ---- solving ---- */
+
+typedef struct solve_job {
+    const weft_solve_plan *plan;
+    weft_light_plates *plates;
+    const weft_mask *inside;            /* at solving size; data NULL: everywhere */
+    weft_plate colour[WEFT_LIGHTS_MAX]; /* of the band, mosaics only */
+    int colour_row;                     /* solved row that is row 0 of `colour` */
+    int band_row;                       /* first solved row of the band */
+    weft_mat3 colour_matrix;
+    bool has_colour;
+    weft_maps *maps;
+} solve_job;
+
+static void apply_matrix(const weft_mat3 *matrix, float *const rgb[3], int width)
+{
+    float m[9];
+    for (int i = 0; i < 9; i++)
+        m[i] = (float)matrix->m[i];
+    for (int i = 0; i < width; i++) {
+        const float r = rgb[0][i], g = rgb[1][i], b = rgb[2][i];
+        for (int c = 0; c < 3; c++)
+            rgb[c][i] = m[3 * c] * r + m[3 * c + 1] * g + m[3 * c + 2] * b;
+    }
+}
+
+/* Outside the set's mask there is no answer. */
+static void apply_mask(const uint8_t *inside, const weft_solve_row_out *out, int width)
+{
+    for (int i = 0; i < width; i++)
+        if (!inside[i]) {
+            for (int c = 0; c < 3; c++)
+                out->normal[c][i] = out->albedo[c][i] = 0;
+            out->residual[i] = out->confidence[i] = 0;
+            out->valid[i] = 0;
+        }
+}
+
+static void solve_rows(void *context, int band, int row_begin, int row_end)
+{
+    const solve_job *const job = context;
+    weft_maps *const m = job->maps;
+    (void)band;
+    for (int i = row_begin; i < row_end; i++) {
+        const int row = job->band_row + i;
+        weft_solve_row_in in[WEFT_LIGHTS_MAX];
+        weft_solve_row_out out = {.residual = weft_image_row(&m->residual, 0, row),
+                                  .confidence = weft_image_row(&m->confidence, 0, row),
+                                  .valid = m->mask.data + (size_t)row * (size_t)m->width};
+        for (int c = 0; c < 3; c++) {
+            out.normal[c] = weft_image_row(&m->normal, c, row);
+            out.albedo[c] = weft_image_row(&m->albedo, c, row);
+        }
+        weft_light_plates_row(job->plates, row, in);
+        weft_solve_row(job->plan, row, in, &out);
+        if (job->has_colour)
+            apply_matrix(&job->colour_matrix, out.albedo, m->width);
+        if (job->inside->data)
+            apply_mask(job->inside->data + (size_t)row * (size_t)m->width, &out, m->width);
+    }
+}
+
+static weft_err solve_bands(solve_job *job, bool half, weft_error *err)
+{
+    const int height = job->maps->height;
+    weft_progress progress;
+    weft_err status = WEFT_OK;
+    weft_progress_begin(&progress, "solving", "rows", height);
+    for (int first = 0; first < height && status == WEFT_OK; first += BAND) {
+        const int n = height - first < BAND ? height - first : BAND;
+        job->band_row = first;
+        status = weft_light_plates_make_band(job->plates, first, n, half, err);
+        if (status == WEFT_OK) {
+            weft_parallel_rows(n, solve_rows, job);
+            status = weft_progress_step(&progress, n, err);
+        }
+    }
+    weft_progress_end(&progress);
+    return status;
+}
+
+/* ---- masks and maps ---- */
+
+/* A cell is inside when its four sites are. */
+static weft_err halve_mask(weft_mask *mask, weft_error *err)
+{
+    weft_mask half;
+    WEFT_TRY(weft_mask_init(&half, mask->width / 2, mask->height / 2, 0, err));
+    for (int j = 0; j < half.height; j++)
+        for (int i = 0; i < half.width; i++) {
+            const uint8_t *const a = mask->data + (size_t)(2 * j) * (size_t)mask->width + 2 * i;
+            const uint8_t *const b = a + mask->width;
+            half.data[(size_t)j * (size_t)half.width + (size_t)i] = a[0] && a[1] && b[0] && b[1] ? 255 : 0;
+        }
+    weft_mask_fini(mask);
+    *mask = half;
+    return WEFT_OK;
+}
+
+static weft_err load_mask(const weft_set *set, bool half, weft_mask *mask, weft_error *err)
+{
+    if (!set->mask_file)
+        return WEFT_OK;
+    WEFT_TRY(weft_set_load_mask(set, mask, err));
+    if (mask->width != set->width || mask->height != set->height)
+        return weft_fail(err, WEFT_ERR_MISMATCH, "%s/%s has %d x %d pixels, the set has %d x %d", set->folder,
+                         set->mask_file, mask->width, mask->height, set->width, set->height);
+    return half ? halve_mask(mask, err) : WEFT_OK;
+}
+
+static weft_err make_maps(weft_maps *maps, int width, int height, weft_error *err)
+{
+    *maps = (weft_maps){.width = width, .height = height, .geometry = WEFT_GEOMETRY_SENSOR};
+    WEFT_TRY(weft_image_init(&maps->normal, width, height, 3, err));
+    WEFT_TRY(weft_image_init(&maps->albedo, width, height, 3, err));
+    WEFT_TRY(weft_image_init(&maps->residual, width, height, 1, err));
+    WEFT_TRY(weft_image_init(&maps->confidence, width, height, 1, err));
+    return weft_mask_init(&maps->mask, width, height, 0, err);
+}
+
+/* All at sensor geometry. */
+static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal,
+                                const weft_solve_options *options, weft_pixel_scale pixel, weft_maps *maps,
+                                weft_solve_seconds *seconds, weft_error *err)
+{
+    weft_light_plates plates = {0};
+    weft_mask inside = {0};
+    weft_incidence incidence = {0};
+    double clock = weft_clock_s();
+    weft_err status = load_mask(set, options->half, &inside, err);
+    if (status == WEFT_OK)
+        status = weft_light_plates_load(set, options->half, &plates, err);
+    seconds->read = weft_clock_s() - clock;
+    clock = weft_clock_s();
+    const int width = options->half ? set->width / 2 : set->width;
+    const int height = options->half ? set->height / 2 : set->height;
+    if (status == WEFT_OK)
+        status = weft_incidence_init(&incidence, cal, width, height, pixel, options->height_mm, err);
+    if (status == WEFT_OK)
+        status = make_maps(maps, width, height, err);
+    if (status == WEFT_OK) {
+        const weft_solve_plan plan = {&incidence,
+                                      (options->method ? options->method : weft_solve_methods)->solve, width,
+                                      (float)options->shadow};
+        solve_job job = {.plan = &plan, .plates = &plates, .inside = &inside, .maps = maps};
+        job.has_colour = maps->albedo_is_srgb = cal->has_colour;
+        job.colour_matrix = cal->colour.to_linear_srgb;
+        status = solve_bands(&job, options->half, err);
+    }
+    seconds->solve = weft_clock_s() - clock;
+    weft_incidence_fini(&incidence);
+    weft_mask_fini(&inside);
+    weft_light_plates_fini(&plates);
+    return status;
+}
+
+static weft_err put_on_plane(weft_maps *maps, const weft_calibration *cal, const weft_solve_options *options,
+                             weft_pixel_scale pixel, weft_error *err)
+{
+    weft_plane_grid grid;
+    weft_maps plane = {0};
+    double mm_per_px = options->mm_per_px;
+    if (!(mm_per_px > 0))
+        WEFT_TRY(weft_plane_scale(&cal->camera, pixel, options->height_mm, &mm_per_px, err));
+    WEFT_TRY(weft_plane_grid_init(&grid, &cal->camera, mm_per_px, options->height_mm, err));
+    WEFT_TRY(weft_rectify(maps, &cal->camera, pixel, &grid, &plane, err));
+    weft_maps_fini(maps);
+    *maps = plane;
+    return WEFT_OK;
+}
+
+static weft_err require_an_answer(const weft_maps *maps, const weft_set *set, weft_error *err)
+{
+    const size_t n = (size_t)maps->width * (size_t)maps->height;
+    for (size_t i = 0; i < n; i++)
+        if (maps->mask.data[i])
+            return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_NODATA,
+                     "%s: no pixel has three usable lights (all clipped, black, or masked: look at the "
+                     "exposure of its frames)",
+                     set->folder);
+}
+
+weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
+                        const weft_solve_options *options, weft_maps *maps, weft_error *err)
+{
+    const weft_pixel_scale pixel = options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
+    weft_solve_seconds seconds = {0};
+    weft_maps to = {0};
+    WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
+    const bool pose = cal->has_camera && cal->camera.has_pose;
+    if (!pose && !options->sensor_geometry)
+        weft_note("%s has no camera: the maps stay in sensor geometry", cal_folder);
+    weft_err status = solve_on_sensor(set, cal, options, pixel, &to, &seconds, err);
+    if (status == WEFT_OK)
+        status = require_an_answer(&to, set, err);
+    if (status == WEFT_OK && pose && !options->sensor_geometry) {
+        const double clock = weft_clock_s();
+        status = put_on_plane(&to, cal, options, pixel, err);
+        seconds.rectify = weft_clock_s() - clock;
+    }
+    if (status == WEFT_OK)
+        status = weft_solve_describe(set, cal_folder, options, &seconds, &to, err);
+    if (status != WEFT_OK) {
+        weft_maps_fini(&to);
+        return status == WEFT_ERR_CANCELLED ? status : weft_prefix(err, status, "%s", set->name);
+    }
+    *maps = to;
+    return WEFT_OK;
+}

@@ -1,0 +1,197 @@
+#include "host/solve/solve_row.h"
+
+#include "core/clones.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LANES = WEFT_SOLVE_LANES, STRIDE_MAX = (WEFT_INCIDENCE_PLANES(WEFT_LIGHTS_MAX) + 15) / 16 * 16 };
+
+/* The nodes of one row of pixels under a block: at most 16 cells, so 17 nodes. */
+typedef struct block_nodes {
+    float at[LANES + 1][STRIDE_MAX];
+    float part[LANES]; /* of the way to the next node */
+    int step_log2;
+} block_nodes;
+
+WEFT_INLINE void interpolate_nodes(const weft_incidence *inc, int row, int block, block_nodes *to)
+{
+    const int node_row = row >> inc->step_log2, n = LANES >> inc->step_log2;
+    const float t = (float)(row - (node_row << inc->step_log2)) / (float)(1 << inc->step_log2);
+    const size_t row_floats = (size_t)inc->columns * (size_t)inc->stride;
+    const float *const top = inc->nodes + (size_t)node_row * row_floats;
+    for (int i = 0; i <= n; i++) {
+        const float *const a = top + ((size_t)block * (size_t)n + (size_t)i) * (size_t)inc->stride;
+        const float *const b = a + row_floats;
+        for (int p = 0; p < inc->stride; p += LANES)
+#pragma omp simd
+            for (int k = 0; k < LANES; k++)
+                to->at[i][p + k] = a[p + k] + t * (b[p + k] - a[p + k]);
+    }
+}
+
+/* One plane from its nodes to the lanes. */
+WEFT_INLINE void expand(const block_nodes *nodes, int plane, float to[LANES])
+{
+    if (nodes->step_log2 == 4) { /* one cell is the block: the usual case */
+        const float a = nodes->at[0][plane], d = nodes->at[1][plane] - a;
+#pragma omp simd
+        for (int k = 0; k < LANES; k++)
+            to[k] = a + nodes->part[k] * d;
+        return;
+    }
+    for (int k = 0; k < LANES; k++) {
+        const int i = k >> nodes->step_log2;
+        const float a = nodes->at[i][plane];
+        to[k] = a + nodes->part[k] * (nodes->at[i + 1][plane] - a);
+    }
+}
+
+WEFT_INLINE void point_at_light(const weft_incidence *inc, int j, const float x[LANES], const float y[LANES],
+                                weft_solve_samples *s)
+{
+    const float px = inc->light[j][0], py = inc->light[j][1], pz = inc->light[j][2];
+    const float far = inc->distant[j] ? 1 : 0, z = inc->height_mm;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        const float dx = far > 0 ? px : px - x[k], dy = far > 0 ? py : py - y[k], dz = far > 0 ? pz : pz - z;
+        const float inverse = 1 / sqrtf(dx * dx + dy * dy + dz * dz);
+        s->light[0][j][k] = dx * inverse;
+        s->light[1][j][k] = dy * inverse;
+        s->light[2][j][k] = dz * inverse;
+    }
+}
+
+WEFT_INLINE void read_light(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first,
+                            weft_solve_samples *s)
+{
+    float scale[3][LANES];
+    for (int c = 0; c < 3; c++)
+        expand(nodes, 2 + 3 * j + c, scale[c]);
+    const float *const red = in->rgb[0] + first, *const green = in->rgb[1] + first,
+                       *const blue = in->rgb[2] + first;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        const float r = red[k] * scale[0][k], g = green[k] * scale[1][k], b = blue[k] * scale[2][k];
+        const float rg = red[k] > green[k] ? red[k] : green[k], most = rg > blue[k] ? rg : blue[k];
+        const int finite = fabsf(r) + fabsf(g) + fabsf(b) < 1e30F; /* false for NaN */
+        const int use = finite & (most >= in->least);
+        s->weight[j][k] = use ? 1.0F : 0.0F;
+        s->value[0][j][k] = use ? r : 0.0F;
+        s->value[1][j][k] = use ? g : 0.0F;
+        s->value[2][j][k] = use ? b : 0.0F;
+    }
+}
+
+WEFT_INLINE void leave_out_clipped(const uint8_t *clipped, int j, weft_solve_samples *s)
+{
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        const int use = clipped[k] == 0;
+        s->weight[j][k] = use ? s->weight[j][k] : 0.0F;
+        for (int c = 0; c < 3; c++)
+            s->value[c][j][k] = use ? s->value[c][j][k] : 0.0F;
+    }
+}
+
+WEFT_INLINE void make_grey(weft_solve_samples *s, int j)
+{
+#pragma omp simd
+    for (int k = 0; k < LANES; k++)
+        s->grey[j][k] =
+            0.2126F * s->value[0][j][k] + 0.7152F * s->value[1][j][k] + 0.0722F * s->value[2][j][k];
+}
+
+/* Takes out what is far darker than the pixel's brightest sample. */
+WEFT_INLINE void leave_out_shadow(weft_solve_samples *s, float part)
+{
+    float limit[LANES] = {0};
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < LANES; k++)
+            limit[k] = s->grey[j][k] > limit[k] ? s->grey[j][k] : limit[k];
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < LANES; k++) {
+            const int use = s->grey[j][k] >= part * limit[k];
+            s->weight[j][k] = use ? s->weight[j][k] : 0.0F;
+            s->grey[j][k] = use ? s->grey[j][k] : 0.0F;
+            for (int c = 0; c < 3; c++)
+                s->value[c][j][k] = use ? s->value[c][j][k] : 0.0F;
+        }
+}
+
+/* The last block of a row may be narrower than the lanes: it is worked on in a copy. */
+typedef struct margin {
+    float rgb[3][LANES];
+    uint8_t clipped[LANES];
+} margin;
+
+WEFT_INLINE weft_solve_row_in copy_margin(const weft_solve_row_in *in, int first, int n, margin *m)
+{
+    memset(m, 0, sizeof *m);
+    memset(m->clipped, 255, sizeof m->clipped);
+    for (int c = 0; c < 3; c++)
+        memcpy(m->rgb[c], in->rgb[c] + first, (size_t)n * sizeof(float));
+    if (in->clipped)
+        memcpy(m->clipped, in->clipped + first, (size_t)n);
+    else
+        memset(m->clipped, 0, (size_t)n);
+    return (weft_solve_row_in){{m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least};
+}
+
+WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
+                               block_nodes *nodes, weft_solve_samples *s)
+{
+    const weft_incidence *const inc = plan->incidence;
+    const int first = block * LANES, n = plan->width - first < LANES ? plan->width - first : LANES;
+    float x[LANES], y[LANES];
+    interpolate_nodes(inc, row, block, nodes);
+    expand(nodes, 0, x);
+    expand(nodes, 1, y);
+    for (int j = 0; j < inc->n_lights; j++) {
+        margin m;
+        const bool whole = n == LANES;
+        const weft_solve_row_in source = whole ? in[j] : copy_margin(&in[j], first, n, &m);
+        point_at_light(inc, j, x, y, s);
+        read_light(nodes, j, &source, whole ? first : 0, s);
+        if (source.clipped)
+            leave_out_clipped(source.clipped + (whole ? first : 0), j, s);
+        make_grey(s, j);
+    }
+    if (plan->shadow > 0)
+        leave_out_shadow(s, plan->shadow);
+}
+
+static void scatter(const weft_solve_answers *a, const weft_solve_row_out *out, int first, int n)
+{
+    const size_t bytes = (size_t)n * sizeof(float);
+    for (int c = 0; c < 3; c++) {
+        memcpy(out->normal[c] + first, a->normal[c], bytes);
+        memcpy(out->albedo[c] + first, a->albedo[c], bytes);
+    }
+    memcpy(out->residual + first, a->residual, bytes);
+    memcpy(out->confidence + first, a->confidence, bytes);
+    for (int k = 0; k < n; k++)
+        out->valid[first + k] = a->valid[k] > 0 ? 255 : 0;
+}
+
+void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,
+                    const weft_solve_row_out *out)
+{
+    block_nodes nodes;
+    weft_solve_samples samples;
+    weft_solve_answers answers;
+    nodes.step_log2 = plan->incidence->step_log2;
+    for (int k = 0; k < LANES; k++) {
+        const int inside = k & ((1 << nodes.step_log2) - 1);
+        nodes.part[k] = (float)inside / (float)(1 << nodes.step_log2);
+    }
+    samples.n_lights = plan->incidence->n_lights;
+    for (int first = 0; first < plan->width; first += LANES) {
+        const int n = plan->width - first < LANES ? plan->width - first : LANES;
+        gather(plan, row, first / LANES, in, &nodes, &samples);
+        plan->method(&samples, &answers);
+        scatter(&answers, out, first, n);
+    }
+}

@@ -1,0 +1,41 @@
+/** One row of pixels through a solver method: the loop that all the work of `weft solve` goes through. */
+#ifndef WEFT_HOST_SOLVE_SOLVE_ROW_H
+#define WEFT_HOST_SOLVE_SOLVE_ROW_H
+
+#include "host/solve/incidence.h"
+#include "host/solve/samples.h"
+
+/** One row under one light. */
+typedef struct weft_solve_row_in {
+    const float *rgb[3];    /* [width] linear values (1/s); all three the same for a grey picture */
+    const uint8_t *clipped; /* [width] non-zero: not to be used; NULL: none */
+    float least;            /* the largest channel must reach this (3 sigma of black); 0: no rule */
+} weft_solve_row_in;
+
+/** Where the answers of a row go; all [width]. */
+typedef struct weft_solve_row_out {
+    float *normal[3], *albedo[3], *residual, *confidence;
+    uint8_t *valid; /* 255 or 0 */
+} weft_solve_row_out;
+
+/** What is the same for every row. */
+typedef struct weft_solve_plan {
+    const weft_incidence *incidence;
+    weft_solve_fn *method;
+    int width;
+    float shadow; /* samples below this part of the pixel's brightest I' are left out; 0: none */
+} weft_solve_plan;
+
+/**
+ * Solves one row.
+ *
+ * A sample is left out when it is clipped, not finite, below `least`, or where its light does not shine.
+ * Pure and without allocation; from any thread.  The same input gives the same bits on any thread.
+ *
+ * @param in   [n_lights]
+ * @param out  every element is written
+ */
+void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,
+                    const weft_solve_row_out *out);
+
+#endif

@@ -1,0 +1,75 @@
+#!/usr/bin/env bash
+# weft import, solve and compare from the command line, on a set made here.
+set -eu
+weft=$WEFT_TEST_BIN/weft
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+
+expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
+    local status=0 wanted=$1 words=$2
+    shift 2
+    "$@" >out 2>&1 || status=$?
+    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" out; then
+        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
+        cat out
+        exit 1
+    fi
+}
+
+# 16-bit grey PNGs of a flat matte plate (z up, albedo 0.5) under five lights, written by hand
+python3 - <<'PY'
+import os, struct, zlib
+lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0, -0.6, 0.8)]
+def png(path, value, w=32, h=24):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = (b"\0" + struct.pack(">H", value) * w) * h
+    with open(path, "wb") as f:
+        f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", w, h, 16, 0, 0, 0, 0))
+                + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+os.mkdir("flat")
+with open("flat/flat.lp", "w") as f:
+    print(len(lights), file=f)
+    for i, (x, y, z) in enumerate(lights):
+        png(f"flat/p{i}.png", round(65535 * 0.5 * z))
+        print(f"p{i}.png {x} {y} {z}", file=f)
+PY
+
+expect 0 'flat.set: 5 lights, 32 x 24 px' "$weft" import flat -o flat.set
+expect 1 '--force' "$weft" import flat -o flat.set
+expect 0 '100.0 % with an answer' "$weft" solve flat.set -c flat.cal -o flat.maps
+expect 1 'flat.maps' "$weft" solve flat.set -c flat.cal -o flat.maps
+expect 0 '' "$weft" solve flat.set -c flat.cal -o flat.maps --force -q
+test -f flat.maps/normal.exr -a -f flat.maps/maps.json -a -f flat.maps/albedo.png
+expect 0 'max 0.0000 deg' "$weft" compare flat.maps flat.maps
+"$weft" compare flat.maps flat.maps --json | python3 -c '
+import json, sys
+d = json.load(sys.stdin)
+assert d["normal_deg"]["n"] == 32 * 24 and d["normal_deg"]["max"] == 0, d'
+python3 -c '
+import json
+i = json.load(open("flat.maps/maps.json"))
+assert i["options"]["method"] == "lsq" and i["result"]["answered_px"] == 768, i
+assert i["result"]["residual_mean"] < 1e-4 and i["result"]["confidence_mean"] > 0.9, i'
+cp -r flat.set other.set
+"$weft" solve flat.set other.set -c flat.cal -o both -q --json | python3 -c '
+import json, sys
+assert [s["maps"] for s in json.load(sys.stdin)["solved"]] == ["both/flat.maps", "both/other.maps"]'
+test -f both/flat.maps/maps.json -a -f both/other.maps/maps.json
+expect 1 'two sets are called flat' "$weft" solve flat.set flat.set/ -c flat.cal -o twice
+test ! -e twice
+
+expect 2 'SET... is missing' "$weft" solve -c flat.cal -o x
+expect 2 '--calibration' "$weft" solve flat.set -o x
+expect 2 'there are: lsq' "$weft" solve flat.set -c flat.cal -o x --method robuster
+expect 1 'absent.cal' "$weft" solve flat.set -c absent.cal -o x
+expect 1 'absent.set' "$weft" solve absent.set -c flat.cal -o x
+expect 1 'weft calibrate lens' "$weft" solve flat.set -c flat.cal -o x --geometry plane
+rm flat/p3.png
+expect 1 'p3.png' "$weft" solve flat.set -c flat.cal -o x
+expect 1 'line 5: the picture' "$weft" import flat -o again.set
+test ! -e x -a ! -e again.set -a ! -e again.cal
+expect 2 'different kinds' "$weft" compare flat.maps flat/p1.png
+expect 0 'PSNR             inf dB' "$weft" compare flat/p1.png flat/p2.png
+expect 0 'light direction  mean 0.000' "$weft" compare flat.cal flat.cal
