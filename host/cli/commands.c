@@ -5,12 +5,16 @@ extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_import;
 extern const weft_command weft_cmd_solve;
+extern const weft_command weft_cmd_contact;
+extern const weft_command weft_cmd_preview;
 
 /* In the order of the help: the way of the data, from the lights to the picture. */
 const weft_command *const weft_commands[] = {
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_compare,
+    &weft_cmd_preview,
+    &weft_cmd_contact,
     &weft_cmd_brdf,
     &weft_cmd_completion,
     NULL,

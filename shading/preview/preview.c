@@ -89,8 +89,7 @@ static void aim(const weft_preview_setup *setup, weft_preview_samples *s, double
     for (int i = 0; i < s->n; i++) {
         double d[3], share = 1;
         for (int c = 0; c < 3; c++)
-            d[c] = from->is_point ? from->position_mm[c] - s->position[c][i] * setup->surface->mm_per_px
-                                  : from->direction[c];
+            d[c] = from->is_point ? from->position_mm[c] - s->position_mm[c][i] : from->direction[c];
         if (from->is_point) {
             const double *const p = from->position_mm;
             const double r2 = weft_max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1e-6);

@@ -28,8 +28,8 @@ typedef enum weft_preview_shape {
 typedef struct weft_preview_light {
     bool is_point;
     double direction[3];   /* distant: unit, towards the light */
-    double position_mm[3]; /* point: from the middle of the plane, or of the sphere; it gives the irradiance
-                              below at the middle and falls with the square of the distance */
+    double position_mm[3]; /* point: in the world of the plane, or from the middle of the sphere; it gives
+                              the irradiance below at the origin and falls with the square of the distance */
     double irradiance[3];  /* of a surface that faces the light, linear RGB; pi makes a white card read 1 */
 } weft_preview_light;
 
@@ -46,6 +46,7 @@ typedef struct weft_preview_map {
 typedef struct weft_preview_surface {
     int width, height;        /* of every map */
     double mm_per_px;         /* 0: unknown (no point lights then) */
+    double origin_mm[2];      /* world x, y of the centre of pixel (0, 0); for point lights over the plane */
     const weft_image *normal; /* [3]; NULL: flat.  Need not be unit length; (0,0,0) counts as (0,0,1) */
     const weft_mask *mask;    /* 0 shows the background; NULL: all of it is the sample */
     const weft_brdf *brdf;

@@ -60,15 +60,16 @@ static void set_eye(weft_preview_samples *s, int i, double x, double y, double z
 static void hit_plane(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const double scale = setup->texels_per_px, eye = setup->eye_distance;
+    const weft_preview_surface *const surface = setup->surface;
     const double half_width = setup->crop.width / 2.0, half_height = setup->crop.height / 2.0;
     for (int i = 0; i < s->n; i++) {
         const double x = s->x[i] * scale, y = s->y[i] * scale;
         s->hit[i] = fabs(x) <= half_width && fabs(y) <= half_height ? 1 : 0;
         s->u[i] = half_width - 0.5 + x;
         s->v[i] = half_height - 0.5 - y;
-        s->position[0][i] = x;
-        s->position[1][i] = y;
-        s->position[2][i] = 0;
+        s->position_mm[0][i] = surface->origin_mm[0] + (setup->crop.x + s->u[i]) * surface->mm_per_px;
+        s->position_mm[1][i] = surface->origin_mm[1] - (setup->crop.y + s->v[i]) * surface->mm_per_px;
+        s->position_mm[2][i] = 0;
         set_axes(s, i, 0, 0, 1);
         if (eye > 0)
             set_eye(s, i, -s->x[i], -s->y[i], eye);
@@ -112,7 +113,7 @@ static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
         s->u[i] = setup->crop.width / 2.0 - 0.5 + n[0] * arc;
         s->v[i] = setup->crop.height / 2.0 - 0.5 - n[1] * arc;
         for (int c = 0; c < 3; c++)
-            s->position[c][i] = n[c] * radius;
+            s->position_mm[c][i] = n[c] * radius * setup->surface->mm_per_px;
         set_axes(s, i, n[0], n[1], n[2]);
         if (eye > 0)
             set_eye(s, i, -n[0], -n[1], eye - n[2]);

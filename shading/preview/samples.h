@@ -11,7 +11,7 @@ typedef struct weft_preview_samples {
     double x[WEFT_PREVIEW_RUN], y[WEFT_PREVIEW_RUN]; /* in output pixels from the middle, y up */
     double hit[WEFT_PREVIEW_RUN];                    /* 1 on the sample, 0 on the background */
     double u[WEFT_PREVIEW_RUN], v[WEFT_PREVIEW_RUN]; /* map pixels, before repeating */
-    double position[3][WEFT_PREVIEW_RUN];            /* map pixels from the middle of plane or sphere */
+    double position_mm[3][WEFT_PREVIEW_RUN];         /* world; 0 where the maps have no scale */
     double axis[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the shape */
     double eye[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the viewer */
     double normal[3][WEFT_PREVIEW_RUN];              /* tangent space, from the map */

@@ -9,9 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GAP    12 /* pixels between tiles */
-#define GROUND 0.025f
-#define INK    0.75f
+#define GAP 12 /* pixels between tiles */
+#define INK 0.75f
 
 static int label_height(const weft_sheet *sheet)
 {
@@ -28,7 +27,7 @@ weft_err weft_sheet_init(weft_sheet *sheet, int columns, int rows, int tile_widt
     WEFT_TRY(weft_image_init(&made.image, GAP + columns * (tile_width + GAP),
                              GAP + made.top + rows * (tile_height + label_height(&made) + GAP), 3, err));
     for (size_t i = 0; i < 3 * weft_image_plane_size(&made.image); i++)
-        made.image.data[i] = GROUND;
+        made.image.data[i] = (float)WEFT_SHEET_GROUND;
     weft_font_draw(&made.image, GAP, GAP, made.label_scale + 1, title, INK);
     *sheet = made;
     return WEFT_OK;
@@ -110,6 +109,19 @@ weft_err weft_sheet_place(weft_sheet *sheet, int column, int row, const weft_ima
     return WEFT_OK;
 }
 
+weft_err weft_sheet_show_colour(weft_image *picture, const weft_image *colour, const weft_mask *mask,
+                                weft_error *err)
+{
+    weft_image made;
+    WEFT_TRY(weft_image_copy(&made, colour, err));
+    for (int p = 0; p < made.planes && mask; p++)
+        for (size_t i = 0; i < weft_image_plane_size(&made); i++)
+            if (!mask->data[i])
+                weft_image_plane(&made, p)[i] = (float)WEFT_SHEET_NONE;
+    *picture = made;
+    return WEFT_OK;
+}
+
 weft_err weft_sheet_show_normals(weft_image *picture, const weft_image *normal, weft_error *err)
 {
     weft_image made;
@@ -119,9 +131,10 @@ weft_err weft_sheet_show_normals(weft_image *picture, const weft_image *normal, 
         const float *const x = &normal->data[i], *const y = &normal->data[n + i],
                            *const z = &normal->data[2 * n + i];
         const bool none = !(*x * *x + *y * *y + *z * *z > 1e-12f);
-        made.data[i] = none ? 0.18f : (float)weft_srgb_decode(0.5 + 0.5 * (double)*x);
-        made.data[n + i] = none ? 0.18f : (float)weft_srgb_decode(0.5 + 0.5 * (double)*y);
-        made.data[2 * n + i] = none ? 0.18f : (float)weft_srgb_decode(0.5 + 0.5 * (double)*z);
+        made.data[i] = none ? (float)WEFT_SHEET_NONE : (float)weft_srgb_decode(0.5 + 0.5 * (double)*x);
+        made.data[n + i] = none ? (float)WEFT_SHEET_NONE : (float)weft_srgb_decode(0.5 + 0.5 * (double)*y);
+        made.data[2 * n + i] =
+            none ? (float)WEFT_SHEET_NONE : (float)weft_srgb_decode(0.5 + 0.5 * (double)*z);
     }
     *picture = made;
     return WEFT_OK;
@@ -153,7 +166,7 @@ weft_err weft_sheet_show_scalar(weft_image *picture, const weft_image *scalar, c
         const double value = (double)scalar->data[i];
         float *const r = &made.data[i], *const g = &made.data[n + i], *const b = &made.data[2 * n + i];
         if ((mask && !mask->data[i]) || isnan(value))
-            *r = *g = *b = 0.18f;
+            *r = *g = *b = (float)WEFT_SHEET_NONE;
         else
             viridis(high > low ? (value - low) / (high - low) : 0, r, g, b);
     }

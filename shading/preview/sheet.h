@@ -5,6 +5,9 @@
 #include "core/error.h"
 #include "core/image.h"
 
+#define WEFT_SHEET_GROUND 0.025 /* linear grey of the sheet between the tiles */
+#define WEFT_SHEET_NONE   0.18  /* and of places without an answer */
+
 /** A sheet under construction: linear RGB, written with the sRGB curve. */
 typedef struct weft_sheet {
     weft_image image; /* 3 planes */
@@ -27,6 +30,10 @@ weft_err weft_sheet_place(weft_sheet *sheet, int column, int row, const weft_ima
 /** Scales by area (every source pixel counts for its share), aspect as asked. */
 weft_err weft_image_scale(weft_image *scaled, const weft_image *image, int width, int height,
                           weft_error *err);
+
+/** A linear picture whose masked places are grey; mask may be NULL. */
+weft_err weft_sheet_show_colour(weft_image *picture, const weft_image *colour, const weft_mask *mask,
+                                weft_error *err);
 
 /** Normals as the usual picture: code 0.5 + 0.5 n in sRGB-encoded values; masked or zero normals grey. */
 weft_err weft_sheet_show_normals(weft_image *picture, const weft_image *normal, weft_error *err);

@@ -73,12 +73,14 @@ static void test_point_light(void **state)
     const double p[3] = {30, -20, 40};
     weft_image picture;
     surface.mm_per_px = 0.5;
+    surface.origin_mm[0] = -20; /* the middle is at (4.75, 5.25) */
+    surface.origin_mm[1] = 30;
     view.light.is_point = true;
     memcpy(view.light.position_mm, p, sizeof p);
     assert_ok(weft_preview_render(&surface, &view, &picture, err));
     for (int y = 5; y < 100; y += 30)
         for (int x = 5; x < 100; x += 30) {
-            const double at[2] = {(x - 49.5) * 0.5, (49.5 - y) * 0.5};
+            const double at[2] = {-20 + x * 0.5, 30 - y * 0.5};
             const double r2 = pow(p[0] - at[0], 2) + pow(p[1] - at[1], 2) + p[2] * p[2];
             const double d2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
             assert_near(pixel(&picture, 0, x, y), 0.5 * d2 / r2 * p[2] / sqrt(r2), 1e-3);

@@ -1,0 +1,242 @@
+#include "host/cli/command.h"
+#include "host/cli/preview_input.h"
+
+#include "core/file.h"
+#include "core/formats/image_file.h"
+#include "core/mem.h"
+#include "core/text.h"
+#include "shading/preview/sheet.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { COLUMNS = 4, ROWS_PER_INPUT = 2, N_LIGHTS = 3 };
+
+typedef struct contact_args {
+    const char *output, *brdf;
+    weft_texts params;
+    weft_numbers lights;
+    weft_size tile;
+    double exposure_ev, repeat;
+} contact_args;
+
+static const weft_field fields[] = {
+    {.key = "output",
+     .short_opt = 'o',
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(contact_args, output),
+     .unit = "IMAGE",
+     .required = true,
+     .help = "picture to write: PNG or TIFF in sRGB, EXR linear"},
+    {.key = "brdf",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(contact_args, brdf),
+     .unit = "NAME",
+     .def = "lambert",
+     .help = "reflectance model of the previews; \"weft brdf\" lists them"},
+    {.key = "param",
+     .short_opt = 'p',
+     .type = WEFT_FIELD_TEXTS,
+     .offset = offsetof(contact_args, params),
+     .unit = "NAME=VALUE",
+     .help = "a parameter of the model: a number or r,g,b; may be given several times"},
+    {.key = "lights",
+     .type = WEFT_FIELD_F64S,
+     .offset = offsetof(contact_args, lights),
+     .unit = "AZ,EL,AZ,EL,AZ,EL",
+     .def = "0,30,120,30,240,30",
+     .help = "the three lights over the plane, in degrees"},
+    {.key = "tile",
+     .type = WEFT_FIELD_SIZE,
+     .offset = offsetof(contact_args, tile),
+     .def = "420x280",
+     .help = "of one picture of the sheet"},
+    {.key = "exposure",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(contact_args, exposure_ev),
+     .unit = "EV",
+     .min = -20,
+     .max = 20,
+     .def = "1",
+     .help = "of the previews; at 0 a white card that faces the light is just white"},
+    {.key = "repeat",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(contact_args, repeat),
+     .min = 0.01,
+     .max = 100,
+     .def = "1",
+     .help = "ball: how often the shorter side of the map fits half round"},
+    {0},
+};
+
+/* One input's block of tiles. */
+typedef struct block {
+    weft_sheet *sheet;
+    int first_row;
+    const contact_args *args;
+    const weft_preview_input *input;
+} block;
+
+static weft_err place(const block *b, int tile, const weft_image *picture, const char *label, weft_error *err)
+{
+    return weft_sheet_place(b->sheet, tile % COLUMNS, b->first_row + tile / COLUMNS, picture, label, err);
+}
+
+static weft_err place_and_release(const block *b, int tile, weft_image *picture, const char *label,
+                                  weft_error *err)
+{
+    const weft_err status = place(b, tile, picture, label, err);
+    weft_image_fini(picture);
+    return status;
+}
+
+static weft_err place_albedo(const block *b, int tile, weft_error *err)
+{
+    const weft_maps *const maps = &b->input->maps;
+    weft_image picture;
+    WEFT_TRY(weft_sheet_show_colour(&picture, &maps->albedo, maps->mask.data ? &maps->mask : NULL, err));
+    return place_and_release(b, tile, &picture, maps->albedo_is_srgb ? "albedo" : "albedo (camera colours)",
+                             err);
+}
+
+static weft_err place_normal(const block *b, int tile, weft_error *err)
+{
+    weft_image picture;
+    WEFT_TRY(weft_sheet_show_normals(&picture, &b->input->maps.normal, err));
+    return place_and_release(b, tile, &picture, "normal", err);
+}
+
+static weft_err place_residual(const block *b, int tile, weft_error *err)
+{
+    const weft_maps *const maps = &b->input->maps;
+    const weft_mask *const mask = maps->mask.data ? &maps->mask : NULL;
+    weft_image picture;
+    double median, top;
+    char label[64];
+    WEFT_TRY(weft_image_quantile(&maps->residual, 0, mask, 0.5, &median, err));
+    WEFT_TRY(weft_image_quantile(&maps->residual, 0, mask, 0.99, &top, err));
+    WEFT_TRY(weft_sheet_show_scalar(&picture, &maps->residual, mask, 0, top, err));
+    snprintf(label, sizeof label, "residual 0..%.2g%% med %.2g%%", 100 * top, 100 * median);
+    return place_and_release(b, tile, &picture, label, err);
+}
+
+static weft_err place_confidence(const block *b, int tile, weft_error *err)
+{
+    const weft_maps *const maps = &b->input->maps;
+    weft_image picture;
+    WEFT_TRY(
+        weft_sheet_show_scalar(&picture, &maps->confidence, maps->mask.data ? &maps->mask : NULL, 0, 1, err));
+    return place_and_release(b, tile, &picture, "confidence 0..1", err);
+}
+
+static weft_err place_preview(const block *b, int tile, weft_preview_shape shape, const double angles[2],
+                              weft_error *err)
+{
+    weft_preview_view view = weft_preview_view_defaults();
+    weft_image picture;
+    char label[64];
+    view.shape = shape;
+    view.width = b->args->tile.width;
+    view.height = b->args->tile.height;
+    view.exposure_ev = b->args->exposure_ev;
+    view.ambient = 0.02;
+    view.background = shape == WEFT_PREVIEW_SPHERE ? WEFT_SHEET_NONE : WEFT_SHEET_GROUND;
+    view.repeat = b->args->repeat;
+    weft_preview_direction(angles[0], angles[1], view.light.direction);
+    WEFT_TRY(weft_preview_render(&b->input->surface, &view, &picture, err));
+    snprintf(label, sizeof label, "%s, light %g, %g",
+             shape == WEFT_PREVIEW_SPHERE ? "ball" : b->input->surface.brdf->name, angles[0], angles[1]);
+    return place_and_release(b, tile, &picture, label, err);
+}
+
+/* Maps above, previews below; what the folder does not have stays empty. */
+static weft_err fill_block(const block *b, weft_error *err)
+{
+    static const double ball_light[2] = {135, 40}; /* from the upper left, as in most pictures of materials */
+    const weft_maps *const maps = &b->input->maps;
+    if (maps->albedo.planes)
+        WEFT_TRY(place_albedo(b, 0, err));
+    if (maps->normal.planes)
+        WEFT_TRY(place_normal(b, 1, err));
+    if (maps->residual.planes)
+        WEFT_TRY(place_residual(b, 2, err));
+    if (maps->confidence.planes)
+        WEFT_TRY(place_confidence(b, 3, err));
+    for (int light = 0; light < N_LIGHTS; light++)
+        WEFT_TRY(
+            place_preview(b, COLUMNS + light, WEFT_PREVIEW_PLANE, &b->args->lights.values[2 * light], err));
+    return place_preview(b, COLUMNS + N_LIGHTS, WEFT_PREVIEW_SPHERE, ball_light, err);
+}
+
+static char *sheet_title(const weft_invocation *inv, weft_error *err)
+{
+    char *title = NULL;
+    for (int i = 0; i < inv->n_operands; i++) {
+        char *const name = weft_preview_title(inv->operands[i], err);
+        char *const longer =
+            name ? weft_asprintf(err, "%s%s%s", title ? title : "", title ? ", " : "", name) : NULL;
+        weft_free(name);
+        weft_free(title);
+        title = longer;
+        if (!title)
+            return NULL;
+    }
+    return title;
+}
+
+static weft_err fill_sheet(const weft_invocation *inv, const contact_args *a, weft_sheet *sheet,
+                           weft_error *err)
+{
+    for (int i = 0; i < inv->n_operands; i++) {
+        weft_preview_input input;
+        WEFT_TRY(weft_preview_input_load(&input, inv->operands[i], a->brdf, &a->params, err));
+        const weft_err status = fill_block(&(block){sheet, i * ROWS_PER_INPUT, a, &input}, err);
+        weft_preview_input_fini(&input);
+        if (status != WEFT_OK)
+            return weft_prefix(err, status, "%s", inv->operands[i]);
+    }
+    return WEFT_OK;
+}
+
+static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
+{
+    const contact_args *const a = args;
+    weft_sheet sheet;
+    WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
+    if (a->lights.n != 2 * N_LIGHTS)
+        return weft_fail(err, WEFT_ERR_USAGE, "--lights wants six numbers: AZ,EL of three lights");
+    char *const title = sheet_title(inv, err);
+    if (!title)
+        return WEFT_ERR_NOMEM;
+    weft_err status = weft_sheet_init(&sheet, COLUMNS, inv->n_operands * ROWS_PER_INPUT, a->tile.width,
+                                      a->tile.height, title, err);
+    weft_free(title);
+    WEFT_TRY(status);
+    status = fill_sheet(inv, a, &sheet, err);
+    const int width = sheet.image.width, height = sheet.image.height;
+    if (status == WEFT_OK)
+        status = weft_image_write(a->output, &sheet.image, 8, WEFT_TRANSFER_SRGB, err);
+    weft_sheet_fini(&sheet);
+    WEFT_TRY(status);
+    if (inv->json)
+        return weft_print_json(
+            inv, json_pack("{s:s, s:i, s:i}", "output", a->output, "width", width, "height", height), err);
+    fprintf(inv->out, "%s: %d x %d\n", a->output, width, height);
+    return WEFT_OK;
+}
+
+const weft_command weft_cmd_contact = {
+    .name = "contact",
+    .summary = "a sheet with the maps and previews of one or more samples",
+    .operands = "MAPS...",
+    .min_operands = 1,
+    .max_operands = -1,
+    .args_size = sizeof(contact_args),
+    .fields = fields,
+    .details =
+        "For each folder of maps: albedo, normal (as the usual picture), residual and confidence in false\n"
+        "colour, then the cloth under three lights and on a ball.  The residual's scale ends where 99 % of\n"
+        "the pixels are below.",
+    .example = "weft contact twill.maps plain-weave.maps -o sheet.png --brdf cloth",
+    .run = run,
+};

@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# weft preview and weft contact on maps made by formula.
+set -eu
+weft=$WEFT_TEST_BIN/weft
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+"$WEFT_TEST_BUILD/tests/make-weave-maps" weave.maps
+"$WEFT_TEST_BUILD/tests/make-weave-maps" sensor.maps sensor
+
+expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
+    local status=0 wanted=$1 words=$2
+    shift 2
+    "$@" >out 2>&1 || status=$?
+    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" out; then
+        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
+        cat out
+        exit 1
+    fi
+}
+is_png() { # FILE WIDTH HEIGHT
+    python3 - "$@" <<'EOF'
+import struct, sys
+data = open(sys.argv[1], "rb").read()
+assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[-8:-4] == b"IEND", "not a whole PNG"
+assert struct.unpack(">II", data[16:24]) == (int(sys.argv[2]), int(sys.argv[3])), struct.unpack(">II", data[16:24])
+EOF
+}
+
+expect 0 'plane.png: 400 x 300, lambert' "$weft" preview weave.maps -o plane.png
+is_png plane.png 400 300
+expect 0 '"width":64' "$weft" preview weave.maps/ -o ball.png --json --shape sphere --brdf cloth --param f0=0.2,0.1,0.1 \
+    --size 64x48 --fov 20 --light 60,20
+is_png ball.png 64 48
+expect 0 'point.exr' "$weft" preview weave.maps -o point.exr --light-mm=-20,0,40 --brdf ggx --param alpha=weave.maps/confidence.exr
+expect 0 'sheet.png: 1740 x ' "$weft" contact weave.maps sensor.maps -o sheet.png
+
+# light from the left brightens the left flanks: the picture under 180,30 and under 0,30 must differ, and the
+# same command must give the same bytes
+"$weft" preview -q weave.maps -o a.png --light 180,30 >/dev/null
+"$weft" preview -q weave.maps -o b.png --light 180,30 >/dev/null
+"$weft" preview -q weave.maps -o c.png --light 0,30 >/dev/null
+cmp a.png b.png
+! cmp -s a.png c.png
+
+expect 1 'plane.png' "$weft" preview weave.maps -o plane.png
+expect 0 'plane.png' "$weft" preview weave.maps -o plane.png --force
+expect 2 'output' "$weft" preview weave.maps
+expect 2 'no such BRDF; there are' "$weft" preview weave.maps -o x.png --brdf gxx
+expect 2 'it has albedo' "$weft" preview weave.maps -o x.png --param alpha=1
+expect 2 'AZ,EL' "$weft" preview weave.maps -o x.png --light 1
+expect 2 'X,Y,Z' "$weft" preview weave.maps -o x.png --light-mm 0,0,0
+expect 2 'six numbers' "$weft" contact weave.maps -o x.png --lights 1,2
+expect 1 'have none' "$weft" preview sensor.maps -o x.png --light-mm 0,0,100
+expect 1 'absent.maps' "$weft" preview absent.maps -o x.png
+expect 1 'no/such/x.png' "$weft" preview weave.maps -o no/such/x.png
+printf 'not a picture' >broken.exr
+expect 1 'broken.exr' "$weft" preview weave.maps -o x.png --brdf ggx --param alpha=broken.exr
+head -c 2000 weave.maps/normal.exr >cut && cp -r weave.maps cut.maps && mv cut cut.maps/normal.exr
+expect 1 'normal.exr' "$weft" preview cut.maps -o x.png
+[ ! -e x.png ] && [ -z "$(find . -name '.weft-*')" ]
