@@ -25,46 +25,71 @@ typedef struct weft_controller_info {
     int protocol_major, protocol_minor;
     int n_lights;
     int level_max; /* PWM steps: level 0..level_max */
+    int max_on_ms; /* the longest time that one weft_controller_light() may ask for */
     uint32_t tick_hz;
     uint32_t boot_nonce;
     uint32_t capabilities;
-    char reset_cause[32];
+    char reset_cause[32]; /* "POWER_ON", "WATCHDOG", ... */
 } weft_controller_info;
 
 typedef struct weft_controller_status {
-    const char *state; /* "BOOT", "SAFE", "IDLE", "LIT", "RUNNING", "FAULT" */
-    uint32_t lights;   /* bit i: light i is on */
+    const char *state;      /* "BOOT", "SAFE", "IDLE", "LIT", "RUNNING", "FAULT" */
+    const char *safe_cause; /* "NONE", "LEASE_EXPIRED", "PANIC", "RELEASED" */
+    uint32_t lights;        /* bit i: light i is on */
     int level;
     uint32_t ticks;
     int lease_left_ms;
-    uint32_t frames, crc_errors, overruns, resets;
+    int on_left_ms;                                /* until the lights go off by themselves */
+    uint32_t frames, crc_errors, overruns, resets; /* as the board counts them since its reset */
+    uint32_t max_on_offs;                          /* times that lights went off by their time limit */
+    uint32_t retries, bad_replies;                 /* as this host counts them since opening */
 } weft_controller_status;
 
 /** Opens the port exclusively, shakes hands (waits out a bootloader for 3 s) and takes a lease.
  *  @param lease_ms  the lights go off when the host is silent for that long; 100..5000
- *  @return WEFT_ERR_DEVICE, _TIMEOUT, _PROTOCOL with port and remedy */
+ *  @return WEFT_ERR_DEVICE (no such port, no permission, in use, unplugged), _TIMEOUT (nobody answers),
+ *          _PROTOCOL (something else answers, or firmware of another version) with port and remedy */
 weft_err weft_controller_open(const char *port, int lease_ms, weft_controller **controller, weft_error *err);
 
-/** Lights off, lease given back, port closed.  NULL is fine. */
+/** Lights off, lease given back (by the panic bytes when the board does not answer), port closed.  NULL is
+ *  fine. */
 void weft_controller_close(weft_controller *controller);
 
 const weft_controller_info *weft_controller_get_info(const weft_controller *controller);
 
-/** Turns on exactly the lights of `mask` at `level` (0..level_max) for at most max_on_ms. */
+/**
+ * Turns on exactly the lights of `mask` at `level` (0..level_max) for at most max_on_ms (to a millisecond, on
+ * the short side).  Asking again for what is on begins the time anew without a gap.
+ *
+ * @param max_on_ms  1 .. info->max_on_ms
+ * @param on_tick    gets the board's clock when they went on (info->tick_hz); NULL is fine
+ * @return WEFT_ERR_RANGE; WEFT_ERR_DEVICE when the board has reset or went dark by itself meanwhile;
+ *         WEFT_ERR_TIMEOUT
+ */
 weft_err weft_controller_light(weft_controller *controller, uint32_t mask, int level, int max_on_ms,
                                uint32_t *on_tick, weft_error *err);
+/** All lights off.  off_tick may be NULL. */
 weft_err weft_controller_off(weft_controller *controller, uint32_t *off_tick, weft_error *err);
+/** What the board is doing.  @return WEFT_ERR_DEVICE when it has reset since it was opened */
 weft_err weft_controller_get_status(weft_controller *controller, weft_controller_status *status,
                                     weft_error *err);
-/** Renews the lease: call at least every lease_ms / 3 while waiting for something else. */
+/** Renews the lease: call at least every lease_ms / 3 while waiting for something else.
+ *  @return WEFT_ERR_DEVICE when the board has reset or went dark by itself meanwhile */
 weft_err weft_controller_keep_alive(weft_controller *controller, weft_error *err);
 
 /** File descriptor for the panic bytes: write(fd, "\0\0\0", 3) is async-signal-safe. */
 int weft_controller_panic_fd(const weft_controller *controller);
 
+/** From now until it is closed, a crash of this program (SIGSEGV, SIGABRT and the like, also a hang-up of the
+ *  terminal) darkens the lights of this controller at once instead of at the end of the lease.  One
+ * controller per process; whatever handled these signals before still gets them. */
+void weft_controller_panic_on_crash(const weft_controller *controller);
+
 /** Candidate ports on this machine, best first, as a NULL-ended list; free with weft_controller_free_ports().
- */
+ *  First those that the udev rules of Weft name, then boards by their maker, then any serial USB device. */
 weft_err weft_controller_list_ports(char ***ports, weft_error *err);
+/** The same for a folder that is laid out like /dev. */
+weft_err weft_controller_list_ports_under(const char *dev, char ***ports, weft_error *err);
 void weft_controller_free_ports(char **ports);
 
 #endif

@@ -541,6 +541,25 @@ static void test_reset_button(void **state)
     assert_int_equal(status().resets, 1);
 }
 
+static void on_pulse(void *context)
+{
+    ++*(int *)context;
+}
+
+static void test_trigger_pulses_are_seen(void **state)
+{
+    (void)state;
+    weft_controller_sim *other = NULL;
+    int pulses = 0;
+    assert_ok(weft_controller_sim_create_stepped(elf_path("tests/firmware/pulses.elf"), &other, err));
+    weft_controller_sim_set_trigger(other, on_pulse, &pulses);
+    weft_controller_sim_run(other, 1500);
+    assert_int_equal(pulses, 2);
+    weft_controller_sim_run(other, 20e3);
+    assert_int_equal(pulses, 5); /* rising edges only */
+    weft_controller_sim_destroy(other);
+}
+
 static void test_bad_files(void **state)
 {
     (void)state;
@@ -577,6 +596,7 @@ int main(void)
         TEST(test_watchdog_ends_a_hang_in_darkness),
         TEST(test_panic_works_while_the_program_hangs),
         TEST(test_reset_button),
+        cmocka_unit_test(test_trigger_pulses_are_seen),
         cmocka_unit_test(test_bad_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

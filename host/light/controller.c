@@ -1,0 +1,412 @@
+#include "host/light/controller.h"
+
+#include "core/log.h"
+#include "core/mem.h"
+#include "core/progress.h"
+#include "host/light/controller_crash.h"
+#include "host/light/serial_port.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+
+/* How long the n-th try waits for its reply.  A board answers within a millisecond: the waits are for
+ * damaged frames and for a busy computer. */
+static const int try_ms[] = {50, 100, 200, 400};
+enum { N_TRIES = sizeof try_ms / sizeof try_ms[0] };
+
+static const double hello_every_s = 0.2, hello_within_s = 3; /* an Uno's bootloader takes up to 1.5 s */
+
+struct weft_controller {
+    weft_serial serial;
+    uint8_t seq;
+    uint8_t wire[WEFT_FRAME_WIRE_MAX]; /* the frame that is coming in */
+    size_t n;
+    bool too_long;
+    uint8_t unread[256]; /* bytes behind it */
+    size_t unread_at, unread_n;
+    size_t n_bytes; /* that ever came */
+    uint32_t retries, bad_replies;
+    weft_controller_info info;
+};
+
+/* -- frames --------------------------------------------------------------------------------------------- */
+
+/* Adds a byte; true when it ends a good frame of ours. */
+static bool take_byte(weft_controller *c, uint8_t byte, weft_frame *frame)
+{
+    if (byte != 0) {
+        if (c->n < sizeof c->wire)
+            c->wire[c->n++] = byte;
+        else
+            c->too_long = true;
+        return false;
+    }
+    const bool good = !c->too_long && weft_frame_decode(c->wire, c->n, frame) == WEFT_FRAME_GOOD;
+    if (!good && c->n > 0)
+        c->bad_replies++;
+    c->n = 0;
+    c->too_long = false;
+    return good;
+}
+
+/* The next good frame of any kind; *got is false at the deadline. */
+static weft_err next_frame(weft_controller *c, double deadline_s, weft_frame *frame, bool *got,
+                           weft_error *err)
+{
+    for (;;) {
+        while (c->unread_at < c->unread_n)
+            if (take_byte(c, c->unread[c->unread_at++], frame)) {
+                *got = true;
+                return WEFT_OK;
+            }
+        c->unread_at = 0;
+        WEFT_TRY(weft_serial_read(&c->serial, c->unread, sizeof c->unread, deadline_s, &c->unread_n, err));
+        c->n_bytes += c->unread_n;
+        if (c->unread_n == 0) {
+            *got = false;
+            return WEFT_OK;
+        }
+    }
+}
+
+static void note_event(const weft_controller *c, const weft_frame *frame)
+{
+    if (frame->command == WEFT_EVENT_SAFE && frame->n >= WEFT_SAFE_EVENT_BYTES)
+        weft_explain("%s: the controller went dark: %s", c->serial.name,
+                     weft_protocol_cause_text(frame->payload[0]));
+}
+
+/* The reply to `seq`, or any complaint of a damaged frame: only one command is ever under way. */
+static weft_err next_reply(weft_controller *c, uint8_t seq, uint8_t command, double deadline_s,
+                           weft_frame *reply, bool *got, weft_error *err)
+{
+    for (;;) {
+        WEFT_TRY(next_frame(c, deadline_s, reply, got, err));
+        if (!*got)
+            return WEFT_OK;
+        if (reply->type == WEFT_FRAME_EVENT)
+            note_event(c, reply);
+        else if (reply->type == WEFT_FRAME_REPLY && reply->n > 0 &&
+                 ((reply->seq == seq && reply->command == command) ||
+                  reply->payload[0] == WEFT_STATUS_BAD_CRC))
+            return WEFT_OK;
+    }
+}
+
+static uint8_t encode_request(weft_controller *c, uint8_t command, const uint8_t *payload, uint8_t n,
+                              uint8_t *wire)
+{
+    weft_frame request = {.version = WEFT_PROTOCOL_MAJOR,
+                          .type = WEFT_FRAME_REQUEST,
+                          .seq = ++c->seq,
+                          .command = command,
+                          .n = n};
+    memcpy(request.payload, payload, n);
+    return weft_frame_encode(&request, wire);
+}
+
+/* Sends a command until it is answered.  The same frame again is safe: the board answers it from its
+ * memory and does not run it twice. */
+static weft_err transact(weft_controller *c, uint8_t command, const uint8_t *payload, uint8_t n,
+                         weft_frame *reply, weft_error *err)
+{
+    uint8_t wire[WEFT_FRAME_WIRE_MAX];
+    const uint8_t length = encode_request(c, command, payload, n, wire);
+    const double begin_s = weft_clock_s();
+    for (int i = 0; i < N_TRIES; i++) {
+        bool got;
+        const double deadline_s = weft_clock_s() + 1e-3 * try_ms[i];
+        c->retries += i > 0;
+        WEFT_TRY(weft_serial_write(&c->serial, wire, length, deadline_s, err));
+        WEFT_TRY(next_reply(c, c->seq, command, deadline_s, reply, &got, err));
+        if (got && reply->payload[0] != WEFT_STATUS_BAD_CRC)
+            return WEFT_OK;
+    }
+    return weft_fail(err, WEFT_ERR_TIMEOUT,
+                     "%s: the light controller does not answer %s (%d tries in %.2f s); its lights go off by "
+                     "themselves; check the cable",
+                     c->serial.name, weft_protocol_command_name(command), N_TRIES, weft_clock_s() - begin_s);
+}
+
+/* -- what refusals mean --------------------------------------------------------------------------------- */
+
+static weft_err ask_status(weft_controller *c, weft_status_reply *status, weft_error *err)
+{
+    weft_frame reply;
+    WEFT_TRY(transact(c, WEFT_CMD_STATUS, (const uint8_t *)"", 0, &reply, err));
+    if (reply.payload[0] != WEFT_STATUS_OK)
+        return weft_fail(err, WEFT_ERR_PROTOCOL, "%s: the light controller refuses STATUS: %s",
+                         c->serial.name, weft_protocol_status_text(reply.payload[0]));
+    weft_status_reply_decode(reply.payload + 1, (uint8_t)(reply.n - 1), status);
+    return WEFT_OK;
+}
+
+static weft_err check_same_boot(const weft_controller *c, const weft_status_reply *status, weft_error *err)
+{
+    if (status->boot_nonce == c->info.boot_nonce)
+        return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_DEVICE,
+                     "%s: the light controller has reset meanwhile (%u resets since power on), so what was "
+                     "going on is void; check its supply and cable, then begin again",
+                     c->serial.name, status->resets);
+}
+
+static weft_err check_not_safe(const weft_controller *c, const weft_status_reply *status, weft_error *err)
+{
+    if (status->state != WEFT_STATE_SAFE)
+        return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_DEVICE,
+                     "%s: the light controller has gone dark for safety: %s; begin again", c->serial.name,
+                     weft_protocol_cause_text(status->safe_cause));
+}
+
+/* Turns a refusal into what the user needs to know: mostly that the board is not where we left it. */
+static weft_err refused(weft_controller *c, uint8_t command, uint8_t code, weft_error *err)
+{
+    weft_status_reply status;
+    if (code == WEFT_STATUS_NOT_LEASED || code == WEFT_STATUS_SAFE_LATCHED) {
+        WEFT_TRY(ask_status(c, &status, err));
+        WEFT_TRY(check_same_boot(c, &status, err));
+        WEFT_TRY(check_not_safe(c, &status, err));
+    }
+    return weft_fail(err, WEFT_ERR_PROTOCOL, "%s: the light controller refuses %s: %s", c->serial.name,
+                     weft_protocol_command_name(command), weft_protocol_status_text(code));
+}
+
+/* A command whose reply must be OK; `reply` is then at least `bytes` long behind its status. */
+static weft_err command(weft_controller *c, uint8_t number, const uint8_t *payload, uint8_t n, uint8_t bytes,
+                        weft_frame *reply, weft_error *err)
+{
+    WEFT_TRY(transact(c, number, payload, n, reply, err));
+    if (reply->payload[0] != WEFT_STATUS_OK)
+        return refused(c, number, reply->payload[0], err);
+    if (reply->n < bytes + 1)
+        return weft_fail(err, WEFT_ERR_PROTOCOL,
+                         "%s: the reply to %s is cut (wanted %d bytes, got %d); flash the firmware of this "
+                         "build, docs/hardware.md says how",
+                         c->serial.name, weft_protocol_command_name(number), bytes + 1, reply->n);
+    return WEFT_OK;
+}
+
+/* -- opening -------------------------------------------------------------------------------------------- */
+
+static weft_err nobody_there(const weft_controller *c, weft_error *err)
+{
+    if (c->n_bytes == 0)
+        return weft_fail(err, WEFT_ERR_TIMEOUT,
+                         "%s: nobody answers within %.0f s; is this the light controller, and has it the "
+                         "Weft firmware (docs/hardware.md says how to flash it)?",
+                         c->serial.name, hello_within_s);
+    return weft_fail(err, WEFT_ERR_PROTOCOL,
+                     "%s: something answers, but it is no Weft light controller (%zu bytes without sense); "
+                     "try another port, or flash the firmware, docs/hardware.md says how",
+                     c->serial.name, c->n_bytes);
+}
+
+static weft_err other_version(const weft_controller *c, int major, weft_error *err)
+{
+    return weft_fail(err, WEFT_ERR_PROTOCOL,
+                     "%s: the light controller speaks protocol %d, this program %d; flash the firmware of "
+                     "this build, docs/hardware.md says how",
+                     c->serial.name, major, WEFT_PROTOCOL_MAJOR);
+}
+
+/* HELLO until there is an answer, or it is clear that none will come. */
+static weft_err say_hello(weft_controller *c, weft_hello_reply *hello, weft_error *err)
+{
+    weft_hello_request request = {.proto_major = WEFT_PROTOCOL_MAJOR, .proto_minor = WEFT_PROTOCOL_MINOR};
+    uint8_t payload[WEFT_HELLO_REQUEST_BYTES], wire[1 + WEFT_FRAME_WIRE_MAX];
+    if (getrandom(&request.salt, sizeof request.salt, 0) != sizeof request.salt)
+        request.salt = (uint32_t)(1e6 * weft_clock_s());
+    c->seq = (uint8_t)request.salt; /* not the last program's number again */
+    weft_hello_request_encode(&request, payload);
+    wire[0] = 0; /* ends whatever a modem probe or an old program left half-said */
+    const uint8_t length =
+        (uint8_t)(1 + encode_request(c, WEFT_CMD_HELLO, payload, sizeof payload, wire + 1));
+    const double end_s = weft_clock_s() + hello_within_s;
+    while (weft_clock_s() < end_s) {
+        weft_frame reply;
+        bool got;
+        const double deadline_s = weft_clock_s() + hello_every_s;
+        WEFT_TRY(weft_serial_write(&c->serial, wire, length, deadline_s, err));
+        WEFT_TRY(next_reply(c, c->seq, WEFT_CMD_HELLO, deadline_s, &reply, &got, err));
+        if (!got || reply.payload[0] == WEFT_STATUS_BAD_CRC)
+            continue;
+        if (reply.version != WEFT_PROTOCOL_MAJOR)
+            return other_version(c, reply.version, err);
+        if (reply.payload[0] != WEFT_STATUS_OK)
+            return refused(c, WEFT_CMD_HELLO, reply.payload[0], err);
+        weft_hello_reply_decode(reply.payload + 1, (uint8_t)(reply.n - 1), hello);
+        if (hello->magic != WEFT_PROTOCOL_MAGIC)
+            return nobody_there(c, err);
+        if (hello->proto_major != WEFT_PROTOCOL_MAJOR)
+            return other_version(c, hello->proto_major, err);
+        return WEFT_OK;
+    }
+    return nobody_there(c, err);
+}
+
+static void fill_info(weft_controller *c, const weft_hello_reply *hello)
+{
+    weft_controller_info *const info = &c->info;
+    *info = (weft_controller_info){
+        .protocol_major = hello->proto_major,
+        .protocol_minor = hello->proto_minor,
+        .n_lights = hello->n_lights,
+        .level_max = hello->level_max,
+        .max_on_ms = hello->max_on_ms,
+        .tick_hz = hello->tick_hz,
+        .boot_nonce = hello->boot_nonce,
+        .capabilities = hello->capabilities,
+    };
+    snprintf(info->port, sizeof info->port, "%s", c->serial.name);
+    snprintf(info->firmware, sizeof info->firmware, "%d.%d.%d", hello->fw_version[0], hello->fw_version[1],
+             hello->fw_version[2]);
+    snprintf(info->git_id, sizeof info->git_id, "%.*s", (int)sizeof hello->git_id,
+             (const char *)hello->git_id);
+    snprintf(info->serial_number, sizeof info->serial_number, "%.*s", (int)sizeof hello->serial_number,
+             (const char *)hello->serial_number);
+    snprintf(info->reset_cause, sizeof info->reset_cause, "%s", weft_protocol_reset_name(hello->reset_cause));
+}
+
+static weft_err take_lease(weft_controller *c, int lease_ms, weft_error *err)
+{
+    const weft_lease_request request = {.lease_ms = (uint16_t)lease_ms};
+    uint8_t payload[WEFT_LEASE_REQUEST_BYTES];
+    weft_frame reply;
+    weft_lease_request_encode(&request, payload);
+    return command(c, WEFT_CMD_LEASE, payload, sizeof payload, WEFT_LEASE_REPLY_BYTES, &reply, err);
+}
+
+weft_err weft_controller_open(const char *port, int lease_ms, weft_controller **controller, weft_error *err)
+{
+    if (lease_ms < 100 || lease_ms > 5000)
+        return weft_fail(err, WEFT_ERR_RANGE, "a lease of %d ms: wanted 100 to 5000", lease_ms);
+    weft_controller *const c = weft_alloc(1, sizeof *c, err);
+    if (!c)
+        return WEFT_ERR_NOMEM;
+    c->serial.fd = -1;
+    weft_hello_reply hello;
+    weft_err status = weft_serial_open(&c->serial, port, err);
+    if (status == WEFT_OK)
+        status = say_hello(c, &hello, err);
+    if (status == WEFT_OK) {
+        fill_info(c, &hello);
+        status = take_lease(c, lease_ms, err);
+    }
+    if (status == WEFT_OK) {
+        weft_explain("%s: light controller, firmware %s (%s), %d lights, last start: %s", port,
+                     c->info.firmware, c->info.git_id, c->info.n_lights, c->info.reset_cause);
+        *controller = c;
+    } else {
+        weft_serial_close(&c->serial);
+        weft_free(c);
+    }
+    return status;
+}
+
+void weft_controller_close(weft_controller *c)
+{
+    if (!c)
+        return;
+    static const uint8_t panic[WEFT_PANIC_ZEROS];
+    if (take_lease(c, 0, NULL) != WEFT_OK)
+        (void)weft_serial_write(&c->serial, panic, sizeof panic, weft_clock_s() + 0.1, NULL);
+    weft_controller_forget_crash(c->serial.fd);
+    weft_serial_close(&c->serial);
+    weft_free(c);
+}
+
+/* -- commands ------------------------------------------------------------------------------------------- */
+
+const weft_controller_info *weft_controller_get_info(const weft_controller *c)
+{
+    return &c->info;
+}
+
+static weft_err check_light(const weft_controller_info *info, uint32_t mask, int level, int max_on_ms,
+                            weft_error *err)
+{
+    if (info->n_lights < 32 && mask >> info->n_lights)
+        return weft_fail(err, WEFT_ERR_RANGE, "%s: there is no light %d: this controller has 0 to %d",
+                         info->port, 31 - __builtin_clz(mask), info->n_lights - 1);
+    if (level < 0 || level > info->level_max)
+        return weft_fail(err, WEFT_ERR_RANGE, "%s: light level %d: wanted 0 to %d", info->port, level,
+                         info->level_max);
+    if (max_on_ms < 1 || max_on_ms > info->max_on_ms)
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "%s: light for %d ms: this controller gives 1 to %d ms at a time", info->port,
+                         max_on_ms, info->max_on_ms);
+    return WEFT_OK;
+}
+
+weft_err weft_controller_light(weft_controller *c, uint32_t mask, int level, int max_on_ms, uint32_t *on_tick,
+                               weft_error *err)
+{
+    WEFT_TRY(check_light(&c->info, mask, level, max_on_ms, err));
+    const weft_light_request request = {
+        .mask = (uint16_t)mask, .level = (uint16_t)level, .max_on_ms = (uint16_t)max_on_ms};
+    uint8_t payload[WEFT_LIGHT_REQUEST_BYTES];
+    weft_frame frame;
+    weft_light_reply reply;
+    weft_light_request_encode(&request, payload);
+    WEFT_TRY(command(c, WEFT_CMD_LIGHT, payload, sizeof payload, WEFT_LIGHT_REPLY_BYTES, &frame, err));
+    weft_light_reply_decode(frame.payload + 1, (uint8_t)(frame.n - 1), &reply);
+    if (on_tick)
+        *on_tick = reply.on_tick;
+    return WEFT_OK;
+}
+
+weft_err weft_controller_off(weft_controller *c, uint32_t *off_tick, weft_error *err)
+{
+    weft_frame frame;
+    weft_off_reply reply;
+    WEFT_TRY(command(c, WEFT_CMD_OFF, (const uint8_t *)"", 0, WEFT_OFF_REPLY_BYTES, &frame, err));
+    weft_off_reply_decode(frame.payload + 1, (uint8_t)(frame.n - 1), &reply);
+    if (off_tick)
+        *off_tick = reply.off_tick;
+    return WEFT_OK;
+}
+
+weft_err weft_controller_get_status(weft_controller *c, weft_controller_status *status, weft_error *err)
+{
+    weft_status_reply s;
+    WEFT_TRY(ask_status(c, &s, err));
+    WEFT_TRY(check_same_boot(c, &s, err));
+    *status = (weft_controller_status){
+        .state = weft_protocol_state_name(s.state),
+        .safe_cause = weft_protocol_cause_name(s.safe_cause),
+        .lights = s.lights,
+        .level = s.level,
+        .ticks = s.ticks,
+        .lease_left_ms = s.lease_left_ms,
+        .on_left_ms = s.on_left_ms,
+        .frames = s.frames,
+        .crc_errors = s.crc_errors,
+        .overruns = s.overruns,
+        .resets = s.resets,
+        .max_on_offs = s.max_on_offs,
+        .retries = c->retries,
+        .bad_replies = c->bad_replies,
+    };
+    return WEFT_OK;
+}
+
+weft_err weft_controller_keep_alive(weft_controller *c, weft_error *err)
+{
+    weft_status_reply s;
+    WEFT_TRY(ask_status(c, &s, err));
+    WEFT_TRY(check_same_boot(c, &s, err));
+    return check_not_safe(c, &s, err);
+}
+
+int weft_controller_panic_fd(const weft_controller *c)
+{
+    return c->serial.fd;
+}
+
+void weft_controller_panic_on_crash(const weft_controller *c)
+{
+    weft_controller_watch_crash(c->serial.fd);
+}

@@ -1,0 +1,476 @@
+/* The host's client over a pty against the real firmware on a simulated, paced board. */
+#include "tests/support/support.h"
+
+#include "core/file.h"
+#include "core/progress.h"
+#include "host/light/controller.h"
+#include "host/rig/controller_sim.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <pty.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+static weft_controller_sim *sim;
+static char pty_path[128];
+
+static const char *elf_path(const char *name)
+{
+    static char path[1024];
+    const char *const build = getenv("WEFT_TEST_BUILD");
+    snprintf(path, sizeof path, "%s/%s", build ? build : "build", name);
+    return path;
+}
+
+static int start_with(const char *elf)
+{
+    weft_error error = {0};
+    if (weft_controller_sim_create(elf_path(elf), &sim, pty_path, &error) == WEFT_OK)
+        return 0;
+    print_error("%s\n", error.text);
+    return 1;
+}
+
+static int start(void **state)
+{
+    (void)state;
+    return start_with("firmware/weft-firmware.elf");
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    weft_controller_sim_destroy(sim);
+    sim = NULL;
+    return 0;
+}
+
+static void sleep_ms(int ms)
+{
+    const struct timespec t = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000l};
+    nanosleep(&t, NULL);
+}
+
+static weft_controller *open_it(int lease_ms)
+{
+    weft_controller *c = NULL;
+    assert_ok(weft_controller_open(pty_path, lease_ms, &c, err));
+    return c;
+}
+
+static void test_open_light_status_close(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    const weft_controller_info *const info = weft_controller_get_info(c);
+    assert_string_equal(info->port, pty_path);
+    assert_string_equal(info->firmware, "1.0.0");
+    assert_string_equal(info->reset_cause, "EXTERNAL"); /* opening pulled DTR */
+    assert_int_equal(info->n_lights, 10);
+    assert_int_equal(info->level_max, 256);
+    assert_int_equal(info->max_on_ms, 2000);
+    weft_controller_status s;
+    double fraction[WEFT_SIM_N_LIGHTS];
+    uint32_t on, off;
+    for (int i = 0; i < 10; i++) {
+        assert_ok(weft_controller_light(c, 1u << i, 256, 1500, &on, err));
+        assert_true(weft_controller_sim_expose(sim, 10000, fraction));
+        for (int j = 0; j < 10; j++)
+            assert_near(fraction[j], i == j, 0);
+    }
+    assert_ok(weft_controller_light(c, 0x81, 64, 1500, &on, err));
+    assert_ok(weft_controller_get_status(c, &s, err));
+    assert_string_equal(s.state, "LIT");
+    assert_int_equal(s.lights, 0x81);
+    assert_int_equal(s.level, 64);
+    assert_true(s.on_left_ms > 500 && s.on_left_ms <= 1500);
+    assert_true(s.lease_left_ms <= 1000 && s.lease_left_ms > 900);
+    assert_ok(weft_controller_off(c, &off, err));
+    assert_true(off > on);
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    assert_ok(weft_controller_light(c, 0x3ff, 256, 1500, NULL, err));
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0x3ff);
+    weft_controller_close(c);
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    weft_controller_sim_counters k;
+    weft_controller_sim_get_counters(sim, &k);
+    assert_int_equal(k.opened, 1);
+    assert_int_equal(k.overruns, 0);
+}
+
+static void test_values_out_of_range(void **state)
+{
+    (void)state;
+    weft_controller *c = NULL;
+    assert_fails(weft_controller_open(pty_path, 99, &c, err), WEFT_ERR_RANGE, "100 to 5000");
+    c = open_it(1000);
+    assert_fails(weft_controller_light(c, 1 << 10, 256, 100, NULL, err), WEFT_ERR_RANGE, "no light 10");
+    assert_fails(weft_controller_light(c, 1, 257, 100, NULL, err), WEFT_ERR_RANGE, "0 to 256");
+    assert_fails(weft_controller_light(c, 1, 256, 2001, NULL, err), WEFT_ERR_RANGE, "1 to 2000 ms");
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    weft_controller_close(c);
+}
+
+static void test_keep_alive_holds_the_lease(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(300);
+    assert_ok(weft_controller_light(c, 1, 256, 2000, NULL, err));
+    const double begin_s = weft_controller_sim_time_s(sim);
+    while (weft_controller_sim_time_s(sim) < begin_s + 0.9) {
+        sleep_ms(50);
+        assert_ok(weft_controller_keep_alive(c, err));
+    }
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 1);
+    weft_controller_close(c);
+}
+
+static void test_silence_is_noticed_and_a_second_attempt_succeeds(void **state)
+{
+    (void)state;
+    weft_controller *c = open_it(200);
+    assert_ok(weft_controller_light(c, 1, 256, 2000, NULL, err));
+    sleep_ms(400);
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    assert_fails(weft_controller_keep_alive(c, err), WEFT_ERR_DEVICE, "the host was silent");
+    assert_fails(weft_controller_light(c, 1, 256, 100, NULL, err), WEFT_ERR_DEVICE, "the host was silent");
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    weft_controller_close(c);
+    c = open_it(1000);
+    assert_ok(weft_controller_light(c, 1, 256, 100, NULL, err));
+    weft_controller_close(c);
+}
+
+static void test_board_reset_is_noticed(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    weft_controller_status s;
+    assert_ok(weft_controller_light(c, 1 << 2, 256, 2000, NULL, err));
+    weft_controller_sim_reset(sim);
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    assert_fails(weft_controller_get_status(c, &s, err), WEFT_ERR_DEVICE, "has reset meanwhile");
+    assert_fails(weft_controller_keep_alive(c, err), WEFT_ERR_DEVICE, "has reset meanwhile");
+    assert_fails(weft_controller_light(c, 1, 256, 100, NULL, err), WEFT_ERR_DEVICE, "has reset meanwhile");
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    weft_controller_close(c);
+}
+
+static void test_a_hang_ends_dark_and_is_noticed(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    assert_ok(weft_controller_light(c, 1 << 2, 256, 2000, NULL, err));
+    weft_controller_sim_hang(sim);
+    assert_fails(weft_controller_keep_alive(c, err), WEFT_ERR_DEVICE, "has reset meanwhile");
+    double dark_s;
+    assert_int_equal(weft_controller_sim_lights(sim, &dark_s), 0);
+    weft_controller_close(c);
+}
+
+static void test_ports_that_are_none(void **state)
+{
+    (void)state;
+    weft_controller *c = NULL, *second = NULL;
+    assert_fails(weft_controller_open("/dev/ttyNOT", 1000, &c, err), WEFT_ERR_DEVICE,
+                 "/dev/ttyNOT: there is no such port");
+    assert_fails(weft_controller_open("/dev/null", 1000, &c, err), WEFT_ERR_DEVICE, "not a serial port");
+    c = open_it(1000);
+    assert_fails(weft_controller_open(pty_path, 1000, &second, err), WEFT_ERR_DEVICE,
+                 "another program is using this port");
+    assert_ok(weft_controller_keep_alive(c, err)); /* and the owner is not disturbed */
+    weft_controller_close(c);
+}
+
+static void test_port_vanishes(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    weft_controller_sim_destroy(sim);
+    sim = NULL;
+    assert_fails(weft_controller_keep_alive(c, err), WEFT_ERR_DEVICE, "has vanished");
+    assert_fails(weft_controller_light(c, 1, 256, 100, NULL, err), WEFT_ERR_DEVICE, "has vanished");
+    weft_controller_close(c);
+}
+
+static void test_nobody_answers(void **state)
+{
+    (void)state;
+    weft_controller *c = NULL;
+    assert_int_equal(start_with("tests/firmware/pulses.elf"), 0);
+    const double begin_s = weft_clock_s();
+    assert_fails(weft_controller_open(pty_path, 1000, &c, err), WEFT_ERR_TIMEOUT,
+                 "nobody answers within 3 s");
+    const double took_s = weft_clock_s() - begin_s;
+    assert_true(took_s > 2.9 && took_s < 4);
+}
+
+static void test_firmware_of_another_protocol(void **state)
+{
+    (void)state;
+    weft_controller *c = NULL;
+    assert_int_equal(start_with("tests/firmware/firmware-of-protocol-2.elf"), 0);
+    assert_fails(weft_controller_open(pty_path, 1000, &c, err), WEFT_ERR_PROTOCOL,
+                 "speaks protocol 2, this program 1; flash");
+}
+
+/* -- a host that dies ----------------------------------------------------------------------------------- */
+
+/* This program again, as a host that lights two lamps, says so and then does as told. */
+static int be_a_host(const char *port, const char *how)
+{
+    weft_controller *c = NULL;
+    weft_error error = {0};
+    if (weft_controller_open(port, 1000, &c, &error) != WEFT_OK ||
+        weft_controller_light(c, 0x21, 256, 2000, NULL, &error) != WEFT_OK) {
+        fprintf(stderr, "%s\n", error.text);
+        return 1;
+    }
+    weft_controller_panic_on_crash(c);
+    if (write(STDOUT_FILENO, "!", 1) != 1)
+        return 1;
+    if (strcmp(how, "abort") == 0)
+        abort();
+    for (;;)
+        pause();
+}
+
+static pid_t start_host(const char *how, int *pipe_end)
+{
+    int ends[2];
+    assert_int_equal(pipe2(ends, O_CLOEXEC), 0);
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        dup2(ends[1], STDOUT_FILENO);
+        execl("/proc/self/exe", "check_controller", "host", pty_path, how, (char *)NULL);
+        _exit(127);
+    }
+    close(ends[1]);
+    *pipe_end = ends[0];
+    return child;
+}
+
+static void wait_until_lit(int pipe_end)
+{
+    char byte;
+    struct pollfd p = {.fd = pipe_end, .events = POLLIN};
+    assert_int_equal(poll(&p, 1, 10000), 1);
+    assert_int_equal(read(pipe_end, &byte, 1), 1);
+}
+
+static double wait_until_dark_s(double from_s)
+{
+    for (int i = 0; i < 5000 && weft_controller_sim_lights(sim, NULL) != 0; i++)
+        sleep_ms(1);
+    double dark_s;
+    assert_int_equal(weft_controller_sim_lights(sim, &dark_s), 0);
+    return weft_controller_sim_time_s(sim) - dark_s - from_s;
+}
+
+static void test_killed_host_leaves_darkness_within_a_second(void **state)
+{
+    (void)state;
+    int pipe_end, how;
+    const pid_t child = start_host("wait", &pipe_end);
+    wait_until_lit(pipe_end);
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0x21);
+    const double killed_s = weft_controller_sim_time_s(sim);
+    kill(child, SIGKILL);
+    assert_int_equal(waitpid(child, &how, 0), child);
+    assert_true(WIFSIGNALED(how) && WTERMSIG(how) == SIGKILL);
+    const double took_s = wait_until_dark_s(killed_s);
+    print_message("dark %.3f s of simulated time after SIGKILL\n", took_s);
+    assert_true(took_s > 0 && took_s <= 1);
+    close(pipe_end);
+    weft_controller *const c = open_it(1000); /* the next host finds the port free */
+    weft_controller_close(c);
+}
+
+static void test_crashed_host_leaves_darkness_at_once(void **state)
+{
+    (void)state;
+    int pipe_end, how;
+    const pid_t child = start_host("abort", &pipe_end);
+    wait_until_lit(pipe_end);
+    const double crashed_s = weft_controller_sim_time_s(sim);
+    assert_int_equal(waitpid(child, &how, 0), child);
+    assert_true(WIFSIGNALED(how) && WTERMSIG(how) == SIGABRT);
+    const double took_s = wait_until_dark_s(crashed_s);
+    print_message("dark %.3f s of simulated time after abort()\n", took_s);
+    assert_true(took_s < 0.5); /* the lease alone would take a second */
+    close(pipe_end);
+}
+
+/* -- a bad cable ---------------------------------------------------------------------------------------- */
+
+typedef struct cable {
+    int host, board; /* master of the host's pty; the board's pty */
+    double damage;   /* chance per byte */
+    uint64_t seed;
+    atomic_bool stop;
+    int n_damaged;
+    pthread_t thread;
+    char path[128];
+} cable;
+
+static void carry(cable *c, int from, int to)
+{
+    uint8_t in[256], out[512];
+    const ssize_t n = read(from, in, sizeof in);
+    size_t m = 0;
+    for (ssize_t i = 0; i < n; i++) {
+        out[m++] = in[i];
+        if (weft_test_random(&c->seed) >= c->damage)
+            continue;
+        c->n_damaged++;
+        switch ((int)(weft_test_random(&c->seed) * 3)) {
+        case 0:
+            m--; /* lost */
+            break;
+        case 1:
+            out[m - 1] ^= (uint8_t)(1u << (int)(weft_test_random(&c->seed) * 8));
+            break;
+        default:
+            out[m++] = in[i]; /* twice */
+        }
+    }
+    if (m > 0 && write(to, out, m) < 0)
+        c->n_damaged++;
+}
+
+static void *run_cable(void *context)
+{
+    cable *const c = context;
+    while (!atomic_load(&c->stop)) {
+        struct pollfd p[] = {{.fd = c->host, .events = POLLIN}, {.fd = c->board, .events = POLLIN}};
+        poll(p, 2, 20);
+        if (p[0].revents & POLLIN)
+            carry(c, c->host, c->board);
+        if (p[1].revents & POLLIN)
+            carry(c, c->board, c->host);
+    }
+    return NULL;
+}
+
+static int plug_in(cable *c)
+{
+    int slave;
+    struct termios raw;
+    memset(&raw, 0, sizeof raw);
+    cfmakeraw(&raw);
+    assert_int_equal(openpty(&c->host, &slave, NULL, &raw, NULL), 0);
+    assert_int_equal(ptsname_r(c->host, c->path, sizeof c->path), 0);
+    c->board = open(pty_path, O_RDWR | O_NOCTTY | O_NONBLOCK);
+    assert_true(c->board >= 0);
+    assert_int_equal(pthread_create(&c->thread, NULL, run_cable, c), 0);
+    return slave; /* held open, or the master hangs up between hosts */
+}
+
+static void test_a_bad_cable_costs_retries_and_nothing_else(void **state)
+{
+    (void)state;
+    cable c = {.seed = 7};
+    weft_controller *controller = NULL;
+    weft_controller_status s;
+    const int slave = plug_in(&c);
+    assert_ok(weft_controller_open(c.path, 5000, &controller, err));
+    c.damage = 0.004; /* every tenth exchange */
+    double wrong = 0;
+    for (int i = 0; i < 150; i++) {
+        const uint32_t wanted = 1u << i % 10;
+        assert_ok(weft_controller_light(controller, wanted, 256, 2000, NULL, err));
+        wrong += weft_controller_sim_lights(sim, NULL) != wanted;
+    }
+    c.damage = 0;
+    assert_ok(weft_controller_get_status(controller, &s, err));
+    print_message("%d bytes damaged, %u retries, %u bad frames at the board, %u here\n", c.n_damaged,
+                  s.retries, s.crc_errors, s.bad_replies);
+    assert_int_equal((int)wrong, 0);
+    assert_true(c.n_damaged > 5 && s.retries > 3);
+    assert_true(s.crc_errors + s.bad_replies > 2);
+    weft_controller_close(controller);
+    atomic_store(&c.stop, true);
+    pthread_join(c.thread, NULL);
+    close(slave);
+    close(c.host);
+    close(c.board);
+}
+
+/* -- ports ---------------------------------------------------------------------------------------------- */
+
+static void test_ports_best_first(void **state)
+{
+    (void)state;
+    char **ports;
+    char dev[256], path[512], target[512];
+    snprintf(dev, sizeof dev, "%s", weft_test_path("dev"));
+    static const char *const files[] = {"ttyUSB0", "ttyUSB1", "ttyACM0", "ttyACM1"};
+    static const char *const links[][2] = {
+        {"serial/by-id/usb-Prolific_GPS-if00", "ttyUSB1"},
+        {"serial/by-id/usb-Arduino__www.arduino.cc__0043_7583-if00", "ttyACM0"},
+        {"serial/by-id/usb-1a86_USB2.0-Serial-if00-port0", "ttyUSB0"},
+        {"serial/by-id/usb-Arduino_gone-if00", "ttyACM9"},
+        {"weft/light-7583", "ttyACM0"},
+    };
+    assert_ok(weft_controller_list_ports_under(dev, &ports, err)); /* no such folder: none */
+    assert_null(ports[0]);
+    weft_controller_free_ports(ports);
+    snprintf(path, sizeof path, "%s/serial/by-id", dev);
+    assert_ok(weft_folder_create(path, err));
+    snprintf(path, sizeof path, "%s/weft", dev);
+    assert_ok(weft_folder_create(path, err));
+    for (size_t i = 0; i < 4; i++) {
+        snprintf(path, sizeof path, "%s/%s", dev, files[i]);
+        assert_ok(weft_file_write(path, "", 0, err));
+    }
+    for (size_t i = 0; i < 5; i++) {
+        snprintf(path, sizeof path, "%s/%s", dev, links[i][0]);
+        snprintf(target, sizeof target, "%s/%s", dev, links[i][1]);
+        assert_int_equal(symlink(target, path), 0);
+    }
+    assert_ok(weft_controller_list_ports_under(dev, &ports, err));
+    static const char *const wanted[] = {"weft/light-7583", "serial/by-id/usb-1a86_USB2.0-Serial-if00-port0",
+                                         "serial/by-id/usb-Prolific_GPS-if00", "ttyACM1"};
+    for (size_t i = 0; i < 4; i++) {
+        snprintf(path, sizeof path, "%s/%s", dev, wanted[i]);
+        assert_non_null(ports[i]);
+        assert_string_equal(ports[i], path);
+    }
+    assert_null(ports[4]);
+    weft_controller_free_ports(ports);
+}
+
+int main(int argc, char **argv)
+{
+    if (argc == 4 && strcmp(argv[1], "host") == 0)
+        return be_a_host(argv[2], argv[3]);
+#define TEST(name) cmocka_unit_test_setup_teardown(name, start, stop)
+    const struct CMUnitTest tests[] = {
+        TEST(test_open_light_status_close),
+        TEST(test_values_out_of_range),
+        TEST(test_keep_alive_holds_the_lease),
+        TEST(test_silence_is_noticed_and_a_second_attempt_succeeds),
+        TEST(test_board_reset_is_noticed),
+        TEST(test_a_hang_ends_dark_and_is_noticed),
+        TEST(test_ports_that_are_none),
+        TEST(test_port_vanishes),
+        cmocka_unit_test_teardown(test_nobody_answers, stop),
+        cmocka_unit_test_teardown(test_firmware_of_another_protocol, stop),
+        TEST(test_killed_host_leaves_darkness_within_a_second),
+        TEST(test_crashed_host_leaves_darkness_at_once),
+        TEST(test_a_bad_cable_costs_retries_and_nothing_else),
+        cmocka_unit_test(test_ports_best_first),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
