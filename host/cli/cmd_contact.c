@@ -163,8 +163,8 @@ static weft_err fill_block(const block *b, weft_error *err)
     if (maps->confidence.planes)
         WEFT_TRY(place_confidence(b, 3, err));
     for (int light = 0; light < N_LIGHTS; light++)
-        WEFT_TRY(
-            place_preview(b, COLUMNS + light, WEFT_PREVIEW_PLANE, &b->args->lights.values[2 * light], err));
+        WEFT_TRY(place_preview(b, COLUMNS + light, WEFT_PREVIEW_PLANE,
+                               b->args->lights.values + (size_t)2 * (size_t)light, err));
     return place_preview(b, COLUMNS + N_LIGHTS, WEFT_PREVIEW_SPHERE, ball_light, err);
 }
 

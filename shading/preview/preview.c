@@ -53,7 +53,7 @@ weft_err weft_preview_set_map(weft_preview_surface *surface, const char *name, c
 
 /* Light and view in the frame of the shading normal, whose tangent stays in the plane of the map's X. */
 WEFT_CLONES
-static void turn_to_local(weft_preview_samples *s, double (*light)[WEFT_PREVIEW_RUN])
+static void turn_to_local(weft_preview_samples *s)
 {
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
@@ -67,7 +67,7 @@ static void turn_to_local(weft_preview_samples *s, double (*light)[WEFT_PREVIEW_
             t[c] = (s->axis[0][c][i] - x * n[c]) * inverse;
         const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
         for (int c = 0; c < 3; c++) {
-            const double l = light[c][i], v = s->eye[c][i];
+            const double l = s->lamp[c][i], v = s->eye[c][i];
             local_l[0] += l * t[c];
             local_l[1] += l * b[c];
             local_l[2] += l * n[c];
@@ -83,7 +83,7 @@ static void turn_to_local(weft_preview_samples *s, double (*light)[WEFT_PREVIEW_
 }
 
 /* World direction to the light and its irradiance at each sample, as a share of that at the middle. */
-static void aim(const weft_preview_setup *setup, weft_preview_samples *s, double (*light)[WEFT_PREVIEW_RUN])
+static void aim(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_light *const from = &setup->view->light;
     for (int i = 0; i < s->n; i++) {
@@ -98,7 +98,7 @@ static void aim(const weft_preview_setup *setup, weft_preview_samples *s, double
                 d[c] /= sqrt(r2);
         }
         for (int c = 0; c < 3; c++)
-            light[c][i] = d[c];
+            s->lamp[c][i] = d[c];
         s->irradiance[i] = share;
     }
 }
@@ -123,19 +123,18 @@ static double shape_shadow(const weft_preview_setup *setup, double gl, double nl
 static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_view *const view = setup->view;
-    double light[3][WEFT_PREVIEW_RUN];
     weft_brdf_batch batch = {.n = s->n,
                              .light = {s->light[0], s->light[1], s->light[2]},
                              .view = {s->view[0], s->view[1], s->view[2]}};
     double *const value[3] = {s->value[0], s->value[1], s->value[2]};
     for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
         batch.param[k] = s->param[k];
-    aim(setup, s, light);
-    turn_to_local(s, light);
+    aim(setup, s);
+    turn_to_local(s);
     setup->surface->brdf->eval(&batch, value);
     for (int i = 0; i < s->n; i++) {
-        const double gl =
-            light[0][i] * s->axis[2][0][i] + light[1][i] * s->axis[2][1][i] + light[2][i] * s->axis[2][2][i];
+        const double gl = s->lamp[0][i] * s->axis[2][0][i] + s->lamp[1][i] * s->axis[2][1][i] +
+                          s->lamp[2][i] * s->axis[2][2][i];
         s->irradiance[i] *=
             weft_max(s->light[2][i], 0) * shape_shadow(setup, gl, s->light[2][i], s->normal[2][i]);
     }
@@ -199,7 +198,7 @@ static void render_rows(void *context, int band, int row_begin, int row_end)
     const weft_preview_setup *const setup = r->setup;
     const int ss = setup->supersampling, width = r->picture->width, height = r->picture->height;
     const int last_column = width * ss + ss / 2;
-    weft_preview_samples s;
+    weft_preview_samples s = {0};
     (void)band;
     for (int line = row_begin * ss - ss / 2; line < row_end * ss + ss / 2; line++) {
         const double py = (line + 0.5) / ss - 0.5, top = floor(py), lower = py - top;

@@ -14,6 +14,7 @@ typedef struct weft_preview_samples {
     double position_mm[3][WEFT_PREVIEW_RUN];         /* world; 0 where the maps have no scale */
     double axis[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the shape */
     double eye[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the viewer */
+    double lamp[3][WEFT_PREVIEW_RUN];                /* world, unit, towards the light */
     double normal[3][WEFT_PREVIEW_RUN];              /* tangent space, from the map */
     double param[WEFT_BRDF_MAX_PLANES][WEFT_PREVIEW_RUN];
     double light[3][WEFT_PREVIEW_RUN], view[3][WEFT_PREVIEW_RUN]; /* local frame of the shading normal */

@@ -81,7 +81,8 @@ static void test_values_are_finite_and_not_negative(void **state)
         for (int i = 0; i < N * N * 4; i++) {
             random_values(*b, &random, values);
             weft_brdf_direction(cosines[i % N], 0, l);
-            weft_brdf_direction(cosines[i / N % N], i / (N * N) * WEFT_PI / 3, v);
+            const int quarter = i / (N * N);
+            weft_brdf_direction(cosines[i / N % N], quarter * WEFT_PI / 3, v);
             check_value(*b, values, l, v);
         }
     }
@@ -210,7 +211,8 @@ static void expected_cells(const weft_brdf *brdf, const double values[], const d
                 .n = SUB * SUB, .light = {light[0], light[1], light[2]}, .view = {view[0], view[1], view[2]}};
             for (int i = 0; i < SUB * SUB; i++) {
                 double l[3];
-                const double cosine = -1 + 2.0 * (ring + (i / SUB + 0.5) / SUB) / RINGS;
+                const int across = i / SUB;
+                const double cosine = -1 + 2.0 * (ring + (across + 0.5) / SUB) / RINGS;
                 weft_brdf_direction(cosine, 2 * WEFT_PI * (sector + (i % SUB + 0.5) / SUB) / SECTORS, l);
                 for (int c = 0; c < 3; c++) {
                     light[c][i] = l[c];
