@@ -125,6 +125,13 @@ static bool write_strips(TIFF *t, const weft_mosaic *m)
     return true;
 }
 
+/* libtiff forgets the directory it has written without freeing its texts. */
+static bool begin_picture(TIFF *t)
+{
+    TIFFFreeDirectory(t);
+    return TIFFCreateDirectory(t) == 0;
+}
+
 /* The EXIF directory goes to the file before the picture, which then points to it.  The other way round
  * needs a flush, a checkpoint and a rewritten directory, and loses the last strip without the flush. */
 static bool write_exif(TIFF *t, const weft_frame_info *info)
@@ -138,7 +145,7 @@ static bool write_exif(TIFF *t, const weft_frame_info *info)
            (iso[0] == 0 || TIFFSetField(t, EXIFTAG_ISOSPEEDRATINGS, 1, iso)) &&
            (strlen(info->date_time) != DATE_TIME_LETTERS ||
             TIFFSetField(t, EXIFTAG_DATETIMEORIGINAL, info->date_time)) &&
-           TIFFWriteCustomDirectory(t, &offset) && TIFFCreateDirectory(t) == 0 &&
+           TIFFWriteCustomDirectory(t, &offset) && begin_picture(t) &&
            TIFFSetField(t, TIFFTAG_EXIFIFD, offset);
 }
 
