@@ -1,15 +1,20 @@
 #include "host/cli/command.h"
 
 extern const weft_command weft_cmd_brdf;
+extern const weft_command weft_cmd_capture;
 extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
+extern const weft_command weft_cmd_devices;
 extern const weft_command weft_cmd_import;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_preview;
 
-/* In the order of the help: the way of the data, from the lights to the picture. */
+/* In the order of the help: the way of the data, from the lights to the picture.  One a line. */
+/* clang-format off */
 const weft_command *const weft_commands[] = {
+    &weft_cmd_devices,
+    &weft_cmd_capture,
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_compare,
@@ -19,3 +24,4 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_completion,
     NULL,
 };
+/* clang-format on */

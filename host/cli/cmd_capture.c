@@ -1,0 +1,228 @@
+/* weft capture: photographs a sample under every light. */
+#include "host/capture/capture.h"
+
+#include "core/log.h"
+#include "core/text.h"
+#include "host/cli/command.h"
+#include "host/cli/device_open.h"
+
+#include <poll.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef struct capture_args {
+    weft_device_options devices;
+    const char *lights, *exposure, *name;
+    double gain, settle_s;
+    int bracket, level;
+    bool ambient, no_ambient, dark, all_frame, only_all, resume;
+} capture_args;
+
+static const weft_field capture_fields[] = {
+    WEFT_DEVICE_FIELDS(capture_args, devices),
+    {.key = "lights",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(capture_args, lights),
+     .unit = "LIST",
+     .help = "which lights, one frame each: all, or numbers as 0,3,5 (default all)"},
+    {.key = "exposure",
+     .short_opt = 'e',
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(capture_args, exposure),
+     .unit = "S",
+     .help = "seconds, or auto: the brightest thousandth at 70 % of the range (default auto)"},
+    {.key = "gain",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(capture_args, gain),
+     .unit = "FACTOR",
+     .min = 1,
+     .max = 1000,
+     .help = "analogue gain, 1 = base (default: the camera's least)"},
+    {.key = "bracket",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(capture_args, bracket),
+     .unit = "N",
+     .min = 1,
+     .max = WEFT_CAPTURE_MAX_BRACKET,
+     .help = "exposures of each light, a factor of 4 apart, around --exposure (default 1)"},
+    {.key = "level",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(capture_args, level),
+     .unit = "STEPS",
+     .min = 1,
+     .max = 65535,
+     .help = "brightness of the lights (default full)"},
+    {.key = "settle",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(capture_args, settle_s),
+     .unit = "s",
+     .min = 0.0001,
+     .max = 10,
+     .help = "wait between light on and trigger (default 0.005)"},
+    {.key = "ambient",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, ambient),
+     .help = "a frame with all lights off (the default; with --only-all it must be asked for)"},
+    {.key = "no-ambient",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, no_ambient),
+     .help = "no such frame"},
+    {.key = "dark",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, dark),
+     .help = "also a frame with the lens capped, at the end; asks for it on a terminal"},
+    {.key = "all-frame",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, all_frame),
+     .help = "also a frame with all lights on"},
+    {.key = "only-all",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, only_all),
+     .help = "nothing but the frame with all lights on (a checkerboard for the lens)"},
+    {.key = "resume",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, resume),
+     .help = "go on with a set that was interrupted, with the settings it was begun with"},
+    {.key = "name",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(capture_args, name),
+     .unit = "NAME",
+     .help = "name of the sample (default: the folder's name without .set)"},
+    {0},
+};
+
+/* "all", "0,3,5" to a mask; 0 for all */
+static weft_err parse_lights(const char *text, uint32_t *mask, weft_error *err)
+{
+    *mask = 0;
+    if (!text || strcmp(text, "all") == 0)
+        return WEFT_OK;
+    for (const char *p = text;; p++) {
+        double number;
+        p = weft_text_scan_double(p, &number);
+        if (!p || number < 0 || number >= WEFT_CAPTURE_MAX_LIGHTS || number != (int)number ||
+            (*p != ',' && *p != '\0'))
+            return weft_fail(err, WEFT_ERR_USAGE, "--lights %s: wanted all, or numbers from 0 to %d as 0,3,5",
+                             text, WEFT_CAPTURE_MAX_LIGHTS - 1);
+        *mask |= UINT32_C(1) << (int)number;
+        if (*p == '\0')
+            return WEFT_OK;
+    }
+}
+
+static weft_err parse_exposure(const char *text, double *exposure_s, weft_error *err)
+{
+    *exposure_s = 0;
+    if (!text || strcmp(text, "auto") == 0)
+        return WEFT_OK;
+    if (!weft_text_to_double(text, exposure_s) || *exposure_s < 1e-6 || *exposure_s > 600)
+        return weft_fail(err, WEFT_ERR_USAGE, "--exposure %s: wanted auto, or 0.000001 to 600 s", text);
+    return WEFT_OK;
+}
+
+static weft_err make_options(const weft_invocation *inv, const capture_args *a, weft_capture_options *o,
+                             weft_error *err)
+{
+    *o = (weft_capture_options){
+        .folder = inv->operands[0],
+        .name = a->name,
+        .no_lights = a->only_all,
+        .gain = a->gain,
+        .bracket = a->bracket,
+        .level = a->level,
+        .no_ambient = a->no_ambient || (a->only_all && !a->ambient),
+        .all = a->all_frame || a->only_all,
+        .dark = a->dark,
+        .settle_s = a->settle_s,
+        .resume = a->resume,
+        .force = inv->force,
+    };
+    if (a->ambient && a->no_ambient)
+        return weft_fail(err, WEFT_ERR_USAGE, "--ambient and --no-ambient exclude each other");
+    if (a->only_all && (a->lights || a->bracket > 1))
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--only-all takes no single lights: leave out --lights and --bracket");
+    if (a->resume && inv->force)
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--resume keeps what is there and --force replaces it: give one");
+    WEFT_TRY(parse_lights(a->lights, &o->lights, err));
+    return parse_exposure(a->exposure, &o->exposure_s, err);
+}
+
+/* Asks for the lens cap while the controller's lease is kept alive. */
+static weft_err cap_lens(void *controller, weft_error *err)
+{
+    if (!isatty(STDIN_FILENO)) {
+        weft_note("dark frame: taken as the camera is now; cap the lens before, or take it from a terminal");
+        return WEFT_OK;
+    }
+    weft_note("\ncap the lens, then press Enter");
+    for (;;) {
+        struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
+        char line[256];
+        if (weft_cancelled())
+            return weft_fail(err, WEFT_ERR_CANCELLED, "cancelled before the dark frame");
+        if (poll(&input, 1, WEFT_DEVICE_LEASE_MS / 4) > 0)
+            return read(STDIN_FILENO, line, sizeof line) >= 0
+                       ? WEFT_OK
+                       : weft_fail_errno(err, WEFT_ERR_IO, "the terminal cannot be read");
+        WEFT_TRY(weft_controller_keep_alive(controller, err));
+    }
+}
+
+static weft_err print_result(const weft_invocation *inv, const weft_set *set, const weft_capture_report *r,
+                             weft_error *err)
+{
+    if (inv->json)
+        return weft_print_json(inv,
+                               json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:i, s:f, s:f, s:f}", "set",
+                                         set->folder, "name", set->name, "frames", r->n_frames, "taken",
+                                         r->n_taken, "kept", r->n_kept, "retries", r->n_retries, "warnings",
+                                         r->n_warnings, "exposure_s", r->exposure_s, "gain", r->gain,
+                                         "seconds", r->seconds),
+                               err);
+    fprintf(
+        inv->out, "%s: %d frames (%d taken, %d kept, %d repeated), exposure %.4g s, gain %.3g, in %.1f s\n",
+        set->folder, r->n_frames, r->n_taken, r->n_kept, r->n_retries, r->exposure_s, r->gain, r->seconds);
+    return WEFT_OK;
+}
+
+static weft_err run_capture(const weft_invocation *inv, const void *args, weft_error *err)
+{
+    const capture_args *const a = args;
+    weft_capture_options options;
+    weft_camera_device *camera = NULL;
+    weft_controller *controller = NULL;
+    weft_progress progress = {0};
+    weft_capture_report report = {0};
+    weft_set set = {0};
+    WEFT_TRY(make_options(inv, a, &options, err));
+    WEFT_TRY(weft_capture_check_folder(&options, err));
+    WEFT_TRY(weft_device_open_both(&a->devices, &camera, &controller, err));
+    options.cap_lens = cap_lens;
+    options.context = controller;
+    weft_err status = weft_capture_run(&options, camera, controller, &progress, &set, &report, err);
+    weft_controller_close(controller);
+    weft_camera_close(camera);
+    if (status == WEFT_OK)
+        status = print_result(inv, &set, &report, err);
+    weft_set_fini(&set);
+    return status;
+}
+
+const weft_command weft_cmd_capture = {
+    .name = "capture",
+    .summary = "photograph a sample under every light",
+    .operands = "SET",
+    .min_operands = 1,
+    .max_operands = 1,
+    .args_size = sizeof(capture_args),
+    .fields = capture_fields,
+    .details =
+        "Takes a frame with all lights off, then one with each light alone, looks at each (is it whole, is\n"
+        "the light on, does it clip), takes it again when it is not good, and writes it as a DNG into the\n"
+        "folder SET beside set.json (docs/formats.md).  Ctrl-C switches the lights off and keeps what was\n"
+        "taken; --resume goes on with it.",
+    .example = "weft capture twill.set --exposure 0.04",
+    .run = run_capture,
+};
