@@ -87,7 +87,7 @@ uint16_t fw_board_ms(void)
 void fw_board_send(void)
 {
     uint8_t byte;
-    while (sim.sent < sizeof sim.wire && fw_link_next_byte(&byte))
+    while (!sim.stalled && sim.sent < sizeof sim.wire && fw_link_next_byte(&byte))
         sim.wire[sim.sent++] = byte;
 }
 

@@ -19,6 +19,7 @@ typedef struct sim_board {
     int lit;      /* calls of fw_board_light() */
     int locked;   /* depth */
     int fed;      /* calls of fw_board_watchdog_feed() */
+    bool stalled; /* the line takes no bytes */
     size_t sent;
     uint8_t wire[4096]; /* what was sent */
 } sim_board;
