@@ -34,6 +34,8 @@ enum {
     R_PORTC = 0x28,
     R_DDRD = 0x2a,
     R_PORTD = 0x2b,
+    R_MCUSR = 0x54,
+    R_WDTCSR = 0x60,
     R_TCCR1A = 0x80,
     R_TCCR1B = 0x81,
     R_OCR1AL = 0x88,
@@ -45,6 +47,9 @@ enum {
     FAST_PWM_1B = 0x08, /* of TCCR1B: the same */
     WAVEFORM_1B = 0x18,
     CLOCK_1B = 0x07,
+    WDRF = 0x08, /* of MCUSR: the watchdog made this reset */
+    WDE = 0x08,  /* of WDTCSR */
+    WDCE = 0x10, /* of WDTCSR: lets the next write change it */
     U2X0 = 0x02, /* of UCSR0A */
 };
 
@@ -291,6 +296,17 @@ static void on_reset(avr_t *avr)
     sim->was_reset = true;
 }
 
+/* On the chip a watchdog that has bitten stays on, at its shortest time of 16 ms, until the program clears
+ * WDRF and switches it off (DS40002061B, 11.9.1): a program that forgets that resets for ever. */
+static void keep_watchdog_on(avr_t *avr)
+{
+    const avr_io_addr_t io = AVR_DATA_TO_IO(R_WDTCSR);
+    if (!(avr->data[R_MCUSR] & WDRF) || !avr->io[io].w.c)
+        return;
+    avr->io[io].w.c(avr, R_WDTCSR, WDCE | WDE, avr->io[io].w.param);
+    avr->io[io].w.c(avr, R_WDTCSR, WDE, avr->io[io].w.param);
+}
+
 /* A reset clears the simulator's timers and extint flags, and the ports change without a notice. */
 static void mend_after_reset(weft_controller_sim *sim)
 {
@@ -299,6 +315,7 @@ static void mend_after_reset(weft_controller_sim *sim)
     for (uint8_t i = 0; i < 2; i++) /* or it polls INT0 and INT1, lights of ours, at every cycle */
         avr_extint_set_strict_lvl_trig(sim->avr, i, 0);
     look_at_pins(sim);
+    keep_watchdog_on(sim->avr);
     sim->feeding = false;
     start_feeding(sim);
     for (exposure *e = sim->exposures; e; e = e->next)

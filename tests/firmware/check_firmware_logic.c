@@ -179,6 +179,24 @@ static void test_no_light_between_panic_and_its_notice(void **state)
     assert_int_equal(fw_safety_cause(), WEFT_CAUSE_PANIC);
 }
 
+/* A whole opening conversation in the ring, and then the panic: none of it is carried out afterwards. */
+static void test_panic_voids_what_was_said_before(void **state)
+{
+    (void)state;
+    uint8_t wire[WEFT_FRAME_WIRE_MAX];
+    hear(wire, request(wire, WEFT_CMD_HELLO, "\1\0abcd", 6));
+    hear(wire, request(wire, WEFT_CMD_LEASE, "\xe8\3", 2));
+    hear(wire, request(wire, WEFT_CMD_LIGHT, light_2_full_500ms, 6));
+    hear((const uint8_t *)"\0\0", 2);
+    sim_board_turn();
+    assert_int_equal(sim.lit, 0);
+    assert_int_equal(fw_link_frames(), 0);
+    assert_int_equal(fw_safety_state(), WEFT_STATE_SAFE);
+    sim.sent = read_at = 0;
+    take_lease(1000); /* what is said after it counts */
+    assert_int_equal(fw_safety_state(), WEFT_STATE_IDLE);
+}
+
 static void test_two_zeros_are_no_panic(void **state)
 {
     (void)state;
@@ -339,6 +357,7 @@ int main(void)
         TEST(test_any_valid_frame_renews_the_lease_and_no_other),
         TEST(test_every_way_into_safe_ends_dark),
         TEST(test_no_light_between_panic_and_its_notice),
+        TEST(test_panic_voids_what_was_said_before),
         TEST(test_two_zeros_are_no_panic),
         TEST(test_a_full_ring_drops_whole_replies),
         TEST(test_a_burst_beyond_the_ring),
