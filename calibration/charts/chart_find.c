@@ -212,10 +212,10 @@ static weft_err explain_nothing(const search *s, weft_error *err)
     const weft_chart *const chart = s->chart;
     const reading *const n = &s->nearest;
     if (n->n_seen == 0)
-        return weft_fail(
-            err, WEFT_ERR_NODATA,
-            "no %s chart found: %d regions look like a patch, but no rows and columns of them; " REMEDY,
-            chart->name, s->blobs.n);
+        return weft_fail(err, WEFT_ERR_NODATA,
+                         "no %s chart found: %d regions look like a patch, and none of them stand in rows "
+                         "and columns; " REMEDY,
+                         chart->name, s->blobs.n);
     if (n->mirrored >= WEFT_CHART_SCORE_MIN)
         return weft_fail(
             err, WEFT_ERR_NODATA,

@@ -1,6 +1,9 @@
 #include "host/cli/command.h"
 
 extern const weft_command weft_cmd_brdf;
+extern const weft_command weft_cmd_calibrate_colour;
+extern const weft_command weft_cmd_calibrate_linearity;
+extern const weft_command weft_cmd_calibrate_white;
 extern const weft_command weft_cmd_capture;
 extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
@@ -15,6 +18,9 @@ extern const weft_command weft_cmd_preview;
 const weft_command *const weft_commands[] = {
     &weft_cmd_devices,
     &weft_cmd_capture,
+    &weft_cmd_calibrate_linearity,
+    &weft_cmd_calibrate_white,
+    &weft_cmd_calibrate_colour,
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_compare,

@@ -1,0 +1,34 @@
+/** One colour per patch from many lights: what they agree on. */
+#ifndef WEFT_CALIBRATION_CHARTS_PATCH_COLOUR_H
+#define WEFT_CALIBRATION_CHARTS_PATCH_COLOUR_H
+
+#include "calibration/charts/chart_measure.h"
+#include "calibration/charts/colour_fit.h"
+
+/** Readings under one light, and the linear value that a white patch would have in each place. */
+typedef struct weft_patch_light {
+    const weft_patch_reading *readings;
+    double irradiance[WEFT_CHART_MAX_PATCHES][3];
+} weft_patch_light;
+
+typedef struct weft_patch_colour {
+    double camera[3];     /* reflectance in camera RGB, white balanced by the lights */
+    double spread;        /* largest relative standard deviation between the lights that count */
+    int n_lights;         /* that count: not clipped, no glint, no shadow */
+    const char *excluded; /* why the patch is no good, NULL: it is; one of the texts below */
+} weft_patch_colour;
+
+extern const char *const weft_patch_clipped;  /* more than half of the lights clip in it */
+extern const char *const weft_patch_unsteady; /* the lights disagree by more than 5 % */
+extern const char *const weft_patch_dark;     /* nothing is seen */
+
+/**
+ * Divides every reading by its light and averages over the lights, leaving out clipped ones and those that
+ * stand apart from the median (a glint under one light, a shadow under another).
+ *
+ * @param colours  [patch]
+ */
+void weft_patch_colours(const weft_chart *chart, const weft_patch_light *lights, int n_lights,
+                        weft_patch_colour *colours);
+
+#endif

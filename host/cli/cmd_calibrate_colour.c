@@ -1,0 +1,186 @@
+#include "host/cli/chart_session.h"
+#include "host/cli/command.h"
+
+#include "calibration/calibration_report.h"
+#include "calibration/charts/chart_light.h"
+#include "calibration/charts/patch_colour.h"
+#include "core/json.h"
+#include "core/log.h"
+#include "core/mem.h"
+
+#include <string.h>
+
+typedef struct colour_args {
+    weft_chart_options chart;
+    const char *name, *edition;
+} colour_args;
+
+static const weft_field fields[] = {
+    {.key = "chart",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(colour_args, name),
+     .unit = "NAME",
+     .def = "macbeth",
+     .help = "kind of chart"},
+    {.key = "edition",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(colour_args, edition),
+     .unit = "NAME",
+     .def = "ohta1997",
+     .help = "whose reference colours: ohta1997, before2014, after2014 (when your chart was made)"},
+    WEFT_CHART_FIELDS(colour_args, chart),
+    {0},
+};
+
+/* Held-out colour difference above which something is likely wrong with chart, edition or lights. */
+static const double doubtful_delta_e = 3;
+
+static weft_err collect(const weft_chart_session *session, const weft_chart_options *options,
+                        weft_patch_colour *colours, weft_error *err)
+{
+    const size_t n = (size_t)session->n_lights;
+    weft_patch_light *const lights = weft_alloc(n, sizeof *lights, err);
+    weft_err status = lights ? WEFT_OK : WEFT_ERR_NOMEM;
+    for (int l = 0; l < session->n_lights && status == WEFT_OK; l++) {
+        lights[l].readings = session->readings[l];
+        status = weft_chart_irradiance(&session->cal, l, session->chart, &session->pose, options->height_mm,
+                                       lights[l].irradiance, err);
+        for (int p = 0; p < WEFT_CHART_MAX_PATCHES; p++)
+            for (int c = 0; c < 3; c++)
+                lights[l].irradiance[p][c] *= session->cal.lights[l].intensity[c];
+    }
+    if (status == WEFT_OK)
+        weft_patch_colours(session->chart, lights, session->n_lights, colours);
+    weft_free(lights);
+    return status;
+}
+
+static json_t *report(const weft_chart_session *session, const weft_chart_options *options,
+                      const weft_patch_colour *colours, const weft_colour_fit *fit)
+{
+    json_t *const r = weft_chart_session_report(session, options);
+    json_t *const patches = json_array();
+    for (int p = 0; p < session->chart->columns * session->chart->rows; p++) {
+        const weft_patch_colour *const c = &colours[p];
+        json_t *const one = json_pack(
+            "{s:s, s:o, s:o, s:f, s:f, s:f, s:i, s:f}", "name", session->chart->patches[p].name, "camera",
+            weft_json_numbers(c->camera, 3), "reference",
+            weft_json_numbers(session->chart->patches[p].linear_srgb, 3), "before", fit->before[p], "trained",
+            fit->trained[p], "held_out", fit->held_out[p], "lights", c->n_lights, "spread", c->spread);
+        if (one && c->excluded)
+            json_object_set_new(one, "excluded", json_string(c->excluded));
+        json_array_append_new(patches, one);
+    }
+    json_object_update_new(r, json_pack("{s:i, s:i, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:o}", "patches_used",
+                                        fit->n_used, "rank", fit->rank, "condition", fit->condition,
+                                        "before_mean", fit->before_mean, "before_max", fit->before_max,
+                                        "trained_mean", fit->trained_mean, "trained_max", fit->trained_max,
+                                        "held_out_mean", fit->held_out_mean, "held_out_max",
+                                        fit->held_out_max, "patches", patches));
+    return r;
+}
+
+static weft_err print(const weft_invocation *inv, const weft_chart_session *session,
+                      const weft_patch_colour *colours, const weft_colour_fit *fit, weft_error *err)
+{
+    if (inv->json) {
+        json_t *const r = json_deep_copy(weft_calibration_get_report(&session->cal, "colour"));
+        json_object_set_new(r, "to_linear_srgb", weft_json_numbers(fit->to_linear_srgb.m, 9));
+        return weft_print_json(inv, r, err);
+    }
+    const int n = session->chart->columns * session->chart->rows;
+    fprintf(inv->out, "%s %s: %d of %d patches, condition %.1f\n", session->chart->name,
+            session->chart->edition, fit->n_used, n, fit->condition);
+    for (int p = 0; p < n; p++)
+        if (colours[p].excluded)
+            fprintf(inv->out, "left out: %s (%s)\n", session->chart->patches[p].name, colours[p].excluded);
+    fprintf(inv->out,
+            "CIEDE2000     mean    max\n"
+            "before        %5.2f  %5.2f\n"
+            "trained       %5.2f  %5.2f\n"
+            "held out      %5.2f  %5.2f\n",
+            fit->before_mean, fit->before_max, fit->trained_mean, fit->trained_max, fit->held_out_mean,
+            fit->held_out_max);
+    for (int i = 0; i < 3; i++)
+        fprintf(inv->out, "%9.5f %9.5f %9.5f\n", fit->to_linear_srgb.m[3 * i],
+                fit->to_linear_srgb.m[3 * i + 1], fit->to_linear_srgb.m[3 * i + 2]);
+    return WEFT_OK;
+}
+
+static weft_err fit_colours(const weft_chart_session *session, const weft_patch_colour *colours,
+                            weft_colour_fit *fit, weft_error *err)
+{
+    weft_colour_sample samples[WEFT_CHART_MAX_PATCHES] = {0};
+    const int n = session->chart->columns * session->chart->rows;
+    int clipped = 0;
+    for (int p = 0; p < n; p++) {
+        memcpy(samples[p].camera, colours[p].camera, sizeof samples[p].camera);
+        memcpy(samples[p].reference, session->chart->patches[p].linear_srgb, sizeof samples[p].reference);
+        samples[p].used = !colours[p].excluded;
+        clipped += colours[p].excluded == weft_patch_clipped;
+    }
+    if (clipped > n / 4)
+        return weft_fail(err, WEFT_ERR_NODATA,
+                         "%s: %d of %d patches are clipped: take the chart with a shorter exposure",
+                         session->set.folder, clipped, n);
+    const weft_err status = weft_colour_fit_matrix(samples, n, fit, err);
+    return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", session->set.folder);
+}
+
+static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *err)
+{
+    const colour_args *const args = vargs;
+    weft_chart_session session;
+    weft_patch_colour colours[WEFT_CHART_MAX_PATCHES] = {0};
+    weft_colour_fit fit;
+    WEFT_TRY(weft_chart_session_open(
+        inv, &args->chart, args->name, args->edition,
+        WEFT_CALIBRATION_CAMERA | WEFT_CALIBRATION_POSE | WEFT_CALIBRATION_LIGHTS, &session, err));
+    weft_err status = WEFT_OK;
+    if (session.cal.has_colour && !inv->force)
+        status = weft_fail(err, WEFT_ERR_EXISTS, "%s has a colour matrix already: --force replaces it",
+                           args->chart.output);
+    if (status == WEFT_OK)
+        status = collect(&session, &args->chart, colours, err);
+    if (status == WEFT_OK)
+        status = fit_colours(&session, colours, &fit, err);
+    if (status == WEFT_OK) {
+        if (fit.held_out_mean > doubtful_delta_e)
+            weft_warn("patches that took no part are off by %.1f CIEDE2000 in the mean (1 to 2 is usual): is "
+                      "it this "
+                      "edition of the chart, and are the lights calibrated as they stand?",
+                      fit.held_out_mean);
+        session.cal.colour =
+            (weft_colour_matrix){fit.to_linear_srgb, fit.trained_mean, fit.trained_max, fit.held_out_mean};
+        session.cal.has_colour = true;
+        status = weft_calibration_set_report(&session.cal, "colour",
+                                             report(&session, &args->chart, colours, &fit), err);
+    }
+    if (status == WEFT_OK) {
+        unsigned char left_out[WEFT_CHART_MAX_PATCHES] = {0};
+        for (int p = 0; p < WEFT_CHART_MAX_PATCHES; p++)
+            left_out[p] = colours[p].excluded != NULL;
+        status = weft_chart_session_save(&session, &args->chart, left_out, err);
+    }
+    if (status == WEFT_OK)
+        status = print(inv, &session, colours, &fit, err);
+    weft_chart_session_fini(&session);
+    return status;
+}
+
+const weft_command weft_cmd_calibrate_colour = {
+    .name = "calibrate colour",
+    .summary = "a Macbeth chart, found by itself: from camera RGB to linear sRGB",
+    .operands = "SET",
+    .min_operands = 1,
+    .max_operands = 1,
+    .args_size = sizeof(colour_args),
+    .fields = fields,
+    .details = "Needs the camera's pose and the lights (weft calibrate lens, lights): each photograph is "
+               "divided by the light\n"
+               "that its lamp puts on the chart, which also balances white.  The matrix is fitted to 24 "
+               "patches; the report\n"
+               "gives CIEDE2000 before, of the patches trained on, and of patches held out.",
+    .example = "weft calibrate colour macbeth.set -o scanner.cal --overlay found.png",
+    .run = run,
+};
