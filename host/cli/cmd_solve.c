@@ -50,7 +50,7 @@ static const weft_field fields[] = {
      .offset = offsetof(solve_args, resolution),
      .choices = "full|half",
      .def = "full",
-     .help = "full: demosaiced; half: a pixel per 2x2 cell"},
+     .help = "full: every photosite by its own colour; half: a pixel per 2x2 cell"},
     {.key = "mm-per-px",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, mm_per_px),
@@ -105,6 +105,19 @@ static weft_err output_path(const weft_invocation *inv, const solve_args *args, 
     return *path ? WEFT_OK : WEFT_ERR_NOMEM;
 }
 
+/* Known before minutes of work, not after. */
+static weft_err require_parent(const char *path, weft_error *err)
+{
+    char *const parent = weft_path_folder(path, err);
+    if (!parent)
+        return WEFT_ERR_NOMEM;
+    weft_err status = WEFT_OK;
+    if (!weft_folder_exists(parent))
+        status = weft_fail(err, WEFT_ERR_IO, "%s cannot be made: there is no folder %s", path, parent);
+    weft_free(parent);
+    return status;
+}
+
 /* Two sets of one name would write the same folder. */
 static weft_err refuse_same_names(const weft_invocation *inv, const solve_args *args, int i, const char *path,
                                   weft_error *err)
@@ -130,6 +143,8 @@ static weft_err check_all(const weft_invocation *inv, const solve_args *args, co
         char *path = NULL;
         WEFT_TRY(output_path(inv, args, i, &path, err));
         weft_err status = weft_file_refuse_existing(path, inv->force, err);
+        if (status == WEFT_OK && inv->n_operands == 1)
+            status = require_parent(path, err);
         if (status == WEFT_OK)
             status = refuse_same_names(inv, args, i, path, err);
         weft_free(path);

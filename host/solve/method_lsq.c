@@ -7,10 +7,10 @@
 
 enum { LANES = WEFT_SOLVE_LANES };
 
-/* Sums over the lights: A = L^T L, per channel b = L^T I', and how many samples were used. */
+/* Sums over the lights: A = L^T L, b = L^T I' of the grey, and how many samples were used. */
 typedef struct lane_sums {
     float xx[LANES], xy[LANES], xz[LANES], yy[LANES], yz[LANES], zz[LANES];
-    float rx[LANES], ry[LANES], rz[LANES], gx[LANES], gy[LANES], gz[LANES], bx[LANES], by[LANES], bz[LANES];
+    float bx[LANES], by[LANES], bz[LANES];
     float n[LANES];
 } lane_sums;
 
@@ -21,15 +21,12 @@ WEFT_INLINE void add_up(const weft_solve_samples *s, lane_sums *restrict to)
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++) {
-            const float w = s->weight[j][k];
+            const float w = s->weight[j][k], grey = s->grey[j][k];
             const float x = w * s->light[0][j][k], y = w * s->light[1][j][k], z = w * s->light[2][j][k];
-            const float r = s->value[0][j][k], g = s->value[1][j][k], b = s->value[2][j][k];
             t.n[k] += w;
             t.xx[k] += x * x, t.xy[k] += x * y, t.xz[k] += x * z;
             t.yy[k] += y * y, t.yz[k] += y * z, t.zz[k] += z * z;
-            t.rx[k] += r * x, t.ry[k] += r * y, t.rz[k] += r * z;
-            t.gx[k] += g * x, t.gy[k] += g * y, t.gz[k] += g * z;
-            t.bx[k] += b * x, t.by[k] += b * y, t.bz[k] += b * z;
+            t.bx[k] += grey * x, t.by[k] += grey * y, t.bz[k] += grey * z;
         }
     *to = t;
 }
@@ -38,31 +35,14 @@ typedef struct vec {
     float x, y, z;
 } vec;
 
-/* The sums of one pixel, as scalars. */
+/* The matrix of one pixel, and its number of samples. */
 typedef struct sums {
-    float xx, xy, xz, yy, yz, zz;
-    float rx, ry, rz, gx, gy, gz, bx, by, bz;
-    float n;
+    float xx, xy, xz, yy, yz, zz, n;
 } sums;
 
 WEFT_INLINE sums fetch(const lane_sums *from, int k)
 {
-    return (sums){.xx = from->xx[k],
-                  .xy = from->xy[k],
-                  .xz = from->xz[k],
-                  .yy = from->yy[k],
-                  .yz = from->yz[k],
-                  .zz = from->zz[k],
-                  .rx = from->rx[k],
-                  .ry = from->ry[k],
-                  .rz = from->rz[k],
-                  .gx = from->gx[k],
-                  .gy = from->gy[k],
-                  .gz = from->gz[k],
-                  .bx = from->bx[k],
-                  .by = from->by[k],
-                  .bz = from->bz[k],
-                  .n = from->n[k]};
+    return (sums){from->xx[k], from->xy[k], from->xz[k], from->yy[k], from->yz[k], from->zz[k], from->n[k]};
 }
 
 /* Whether every eigenvalue of A exceeds `least`: A - least is positive definite (pivots of its Cholesky). */
@@ -114,9 +94,9 @@ WEFT_INLINE float spread_across(const factors *f, vec n)
     return trace - (f->d0 * n.x * n.x + f->d1 * m1 * m1 + f->d2 * m2 * m2);
 }
 
-/* The scaled normal k n, and the variance of its direction for unit noise. */
+/* The scaled normal k n, the variance of its direction for unit noise, and 1 / sum (n.l)^2. */
 typedef struct lane_normals {
-    float x[LANES], y[LANES], z[LANES], spread[LANES];
+    float x[LANES], y[LANES], z[LANES], spread[LANES], gain[LANES];
 } lane_normals;
 
 typedef struct lane_misfits {
@@ -144,22 +124,16 @@ WEFT_INLINE void solve_lane(const lane_sums *all, int k, lane_normals *scaled, w
     const sums t = fetch(all, k);
     const float valid = t.n > 2.5F ? determined(&t, least) : 0;
     const factors f = factorise(&t, valid);
-    const vec b = {0.2126F * t.rx + 0.7152F * t.gx + 0.0722F * t.bx,
-                   0.2126F * t.ry + 0.7152F * t.gy + 0.0722F * t.by,
-                   0.2126F * t.rz + 0.7152F * t.gz + 0.0722F * t.bz};
+    const vec b = {all->bx[k], all->by[k], all->bz[k]};
     const vec v = substitute(&f, b);
     const float length = sqrtf(v.x * v.x + v.y * v.y + v.z * v.z);
     const float lit = length >= WEFT_SOLVE_BLACK ? valid : 0.0F;
     const float over = 1 / (lit > 0 ? length : 1.0F);
     const vec n = {lit * v.x * over, lit * v.y * over, lit * v.z * over + (valid - lit)};
 
-    /* albedo with n held fixed: sum I' (n.l) / sum (n.l)^2, both from the sums */
     const float cosines = t.xx * n.x * n.x + t.yy * n.y * n.y + t.zz * n.z * n.z +
                           2 * (t.xy * n.x * n.y + t.xz * n.x * n.z + t.yz * n.y * n.z);
-    const float gain = lit / (lit > 0 ? cosines : 1.0F);
-    a->albedo[0][k] = gain * (t.rx * n.x + t.ry * n.y + t.rz * n.z);
-    a->albedo[1][k] = gain * (t.gx * n.x + t.gy * n.y + t.gz * n.z);
-    a->albedo[2][k] = gain * (t.bx * n.x + t.by * n.y + t.bz * n.z);
+    scaled->gain[k] = lit / (lit > 0 ? cosines : 1.0F);
     a->normal[0][k] = n.x;
     a->normal[1][k] = n.y;
     a->normal[2][k] = n.z;
@@ -168,6 +142,21 @@ WEFT_INLINE void solve_lane(const lane_sums *all, int k, lane_normals *scaled, w
     scaled->y[k] = lit * v.y;
     scaled->z[k] = lit * v.z;
     scaled->spread[k] = lit * spread_across(&f, n) * over * over;
+}
+
+/* Albedo with the normal held fixed: sum I' (n.l) / sum (n.l)^2.  Unused samples are 0 already. */
+WEFT_INLINE void find_albedo(const weft_solve_samples *s, int c, const lane_normals *scaled,
+                             weft_solve_answers *a)
+{
+    float sum[LANES] = {0};
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < LANES; k++)
+            sum[k] += s->value[c][j][k] *
+                      (a->normal[0][k] * s->light[0][j][k] + a->normal[1][k] * s->light[1][j][k] +
+                       a->normal[2][k] * s->light[2][j][k]);
+    for (int k = 0; k < LANES; k++)
+        a->albedo[c][k] = scaled->gain[k] * sum[k];
 }
 
 WEFT_INLINE void judge_lane(const lane_sums *all, const lane_normals *scaled, const lane_misfits *m, int k,
@@ -194,6 +183,8 @@ WEFT_CLONES void weft_solve_lsq(const weft_solve_samples *restrict samples,
 #pragma omp simd
     for (int k = 0; k < LANES; k++)
         solve_lane(&t, k, &scaled, answers);
+    for (int c = 0; c < samples->n_channels; c++)
+        find_albedo(samples, c, &scaled, answers);
     measure(samples, &scaled, &m);
 #pragma omp simd
     for (int k = 0; k < LANES; k++)

@@ -14,18 +14,18 @@
 /** Reflected light over incident light: I'_j = k (n . l_j) for a Lambertian surface (S-ORD-17). */
 typedef struct weft_solve_samples {
     int n_lights;
+    /* 3: `value` holds the channels; 1: sites of a mosaic, each of one colour, which is value[0] and grey */
+    int n_channels;
     float light[3][WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES]; /* unit, towards the light, world X Y Z */
-    float value[3][WEFT_LIGHTS_MAX]
-               [WEFT_SOLVE_LANES];                   /* I' per channel, camera RGB, white balanced; finite */
-    float grey[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES];   /* 0.2126 R + 0.7152 G + 0.0722 B of it */
-    float weight[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES]; /* 1 to be used, 0 left out (values are then 0) */
+    float value[3][WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES]; /* I', white balanced; finite */
+    float grey[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES];     /* 0.2126 R + 0.7152 G + 0.0722 B of it */
+    float weight[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES];   /* 1 to be used, 0 left out (values are then 0) */
 } weft_solve_samples;
 
 typedef struct weft_solve_answers {
-    float normal[3][WEFT_SOLVE_LANES]; /* unit; (0, 0, 0) without an answer */
-    float albedo[3][WEFT_SOLVE_LANES]; /* camera RGB, white balanced; may leave 0..1 */
-    float
-        residual[WEFT_SOLVE_LANES]; /* rms of I' - fit over the samples used, relative to the brightest fit */
+    float normal[3][WEFT_SOLVE_LANES];  /* unit; (0, 0, 0) without an answer */
+    float albedo[3][WEFT_SOLVE_LANES];  /* of the channels, white balanced; may leave 0..1 */
+    float residual[WEFT_SOLVE_LANES];   /* rms of I' - fit over the samples, relative to the brightest fit */
     float confidence[WEFT_SOLVE_LANES]; /* 0..1, docs/solving.md */
     float valid[WEFT_SOLVE_LANES];      /* 1 or 0 */
 } weft_solve_answers;

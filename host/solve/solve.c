@@ -6,13 +6,11 @@
 #include "host/solve/info.h"
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
+#include "host/solve/site_albedo.h"
 #include "host/solve/solve_row.h"
 
 #include <stdio.h>
 #include <string.h>
-
-/* Rows of solved pixels that are demosaiced together; a multiple of WEFT_BAND_ROWS. */
-enum { BAND = 4 * WEFT_BAND_ROWS };
 
 weft_err weft_solve_find_method(const char *name, const weft_solve_method **method, weft_error *err)
 {
@@ -59,13 +57,9 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
 
 typedef struct solve_job {
     const weft_solve_plan *plan;
-    weft_light_plates *plates;
-    const weft_mask *inside;            /* at solving size; data NULL: everywhere */
-    weft_plate colour[WEFT_LIGHTS_MAX]; /* of the band, mosaics only */
-    int colour_row;                     /* solved row that is row 0 of `colour` */
-    int band_row;                       /* first solved row of the band */
-    weft_mat3 colour_matrix;
-    bool has_colour;
+    const weft_light_plates *plates;
+    const weft_mask *inside; /* at solving size; data NULL: everywhere */
+    const weft_calibration *cal;
     weft_maps *maps;
 } solve_job;
 
@@ -81,25 +75,12 @@ static void apply_matrix(const weft_mat3 *matrix, float *const rgb[3], int width
     }
 }
 
-/* Outside the set's mask there is no answer. */
-static void apply_mask(const uint8_t *inside, const weft_solve_row_out *out, int width)
-{
-    for (int i = 0; i < width; i++)
-        if (!inside[i]) {
-            for (int c = 0; c < 3; c++)
-                out->normal[c][i] = out->albedo[c][i] = 0;
-            out->residual[i] = out->confidence[i] = 0;
-            out->valid[i] = 0;
-        }
-}
-
 static void solve_rows(void *context, int band, int row_begin, int row_end)
 {
     const solve_job *const job = context;
     weft_maps *const m = job->maps;
     (void)band;
-    for (int i = row_begin; i < row_end; i++) {
-        const int row = job->band_row + i;
+    for (int row = row_begin; row < row_end; row++) {
         weft_solve_row_in in[WEFT_LIGHTS_MAX];
         weft_solve_row_out out = {.residual = weft_image_row(&m->residual, 0, row),
                                   .confidence = weft_image_row(&m->confidence, 0, row),
@@ -110,30 +91,43 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
         }
         weft_light_plates_row(job->plates, row, in);
         weft_solve_row(job->plan, row, in, &out);
-        if (job->has_colour)
-            apply_matrix(&job->colour_matrix, out.albedo, m->width);
-        if (job->inside->data)
-            apply_mask(job->inside->data + (size_t)row * (size_t)m->width, &out, m->width);
     }
 }
 
-static weft_err solve_bands(solve_job *job, bool half, weft_error *err)
+/* Colour, and nothing where the set's mask or the solver has no answer. */
+static void finish_rows(void *context, int band, int row_begin, int row_end)
 {
-    const int height = job->maps->height;
-    weft_progress progress;
-    weft_err status = WEFT_OK;
-    weft_progress_begin(&progress, "solving", "rows", height);
-    for (int first = 0; first < height && status == WEFT_OK; first += BAND) {
-        const int n = height - first < BAND ? height - first : BAND;
-        job->band_row = first;
-        status = weft_light_plates_make_band(job->plates, first, n, half, err);
-        if (status == WEFT_OK) {
-            weft_parallel_rows(n, solve_rows, job);
-            status = weft_progress_step(&progress, n, err);
+    const solve_job *const job = context;
+    weft_maps *const m = job->maps;
+    (void)band;
+    for (int row = row_begin; row < row_end; row++) {
+        const size_t at = (size_t)row * (size_t)m->width;
+        uint8_t *const answered = m->mask.data + at;
+        float *const rgb[3] = {weft_image_row(&m->albedo, 0, row), weft_image_row(&m->albedo, 1, row),
+                               weft_image_row(&m->albedo, 2, row)};
+        if (job->cal->has_colour)
+            apply_matrix(&job->cal->colour.to_linear_srgb, rgb, m->width);
+        for (int i = 0; i < m->width; i++) {
+            if (job->inside->data && !job->inside->data[at + (size_t)i])
+                answered[i] = 0;
+            if (answered[i])
+                continue;
+            for (int c = 0; c < 3; c++)
+                weft_image_row(&m->normal, c, row)[i] = rgb[c][i] = 0;
+            weft_image_row(&m->residual, 0, row)[i] = weft_image_row(&m->confidence, 0, row)[i] = 0;
         }
     }
-    weft_progress_end(&progress);
-    return status;
+}
+
+static weft_err solve_all_rows(solve_job *job, weft_error *err)
+{
+    const int height = job->maps->height;
+    WEFT_TRY(weft_parallel_rows_progress(height, solve_rows, job, "solving", err));
+    if (job->plan->cfa != WEFT_CFA_NONE)
+        WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, err));
+    weft_parallel_rows(height, finish_rows, job);
+    job->maps->albedo_is_srgb = job->cal->has_colour;
+    return WEFT_OK;
 }
 
 /* ---- masks and maps ---- */
@@ -189,20 +183,17 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
         status = weft_light_plates_load(set, options->half, &plates, err);
     seconds->read = weft_clock_s() - clock;
     clock = weft_clock_s();
-    const int width = options->half ? set->width / 2 : set->width;
-    const int height = options->half ? set->height / 2 : set->height;
     if (status == WEFT_OK)
-        status = weft_incidence_init(&incidence, cal, width, height, pixel, options->height_mm, err);
+        status =
+            weft_incidence_init(&incidence, cal, plates.width, plates.height, pixel, options->height_mm, err);
     if (status == WEFT_OK)
-        status = make_maps(maps, width, height, err);
+        status = make_maps(maps, plates.width, plates.height, err);
     if (status == WEFT_OK) {
-        const weft_solve_plan plan = {&incidence,
-                                      (options->method ? options->method : weft_solve_methods)->solve, width,
+        const weft_solve_method *const method = options->method ? options->method : weft_solve_methods;
+        const weft_solve_plan plan = {&incidence, method->solve, plates.width, plates.cfa,
                                       (float)options->shadow};
-        solve_job job = {.plan = &plan, .plates = &plates, .inside = &inside, .maps = maps};
-        job.has_colour = maps->albedo_is_srgb = cal->has_colour;
-        job.colour_matrix = cal->colour.to_linear_srgb;
-        status = solve_bands(&job, options->half, err);
+        solve_job job = {&plan, &plates, &inside, cal, maps};
+        status = solve_all_rows(&job, err);
     }
     seconds->solve = weft_clock_s() - clock;
     weft_incidence_fini(&incidence);

@@ -12,7 +12,7 @@ typedef struct weft_solve_options {
     const weft_solve_method *method; /* NULL: the first of the table */
     bool sensor_geometry;            /* false: the plane, where the calibration has a camera */
     bool plane_geometry;             /* true: the plane or nothing */
-    bool half;                       /* 2x2 cells instead of demosaicing */
+    bool half;                       /* a pixel for each 2x2 cell, from its luminance */
     double mm_per_px;                /* of the plane; 0: as the sensor at the middle */
     double height_mm;                /* of the sample's surface over the calibrated plane */
     double shadow; /* samples below this part of the pixel's brightest are left out; 0: no such rule */
@@ -32,8 +32,8 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
                           const weft_solve_options *options, weft_error *err);
 
 /**
- * Solves a set.  Reads all frames of the lights (float mosaics stay in memory, colour is made band by
- * band), shows progress, can be cancelled.
+ * Solves a set.  Mosaics are solved site by site, each by its own colour; the albedo is demosaiced at the
+ * end.  Reads all frames of the lights, shows progress, can be cancelled.
  *
  * @param maps  gets normal, albedo, residual, confidence, mask and `info`: options, inputs with hashes,
  *              version, seconds per stage, and how many pixels have an answer

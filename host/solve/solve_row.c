@@ -62,8 +62,8 @@ WEFT_INLINE void point_at_light(const weft_incidence *inc, int j, const float x[
     }
 }
 
-WEFT_INLINE void read_light(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first,
-                            weft_solve_samples *s)
+WEFT_INLINE void read_colours(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first,
+                              weft_solve_samples *s)
 {
     float scale[3][LANES];
     for (int c = 0; c < 3; c++)
@@ -80,26 +80,48 @@ WEFT_INLINE void read_light(const block_nodes *nodes, int j, const weft_solve_ro
         s->value[0][j][k] = use ? r : 0.0F;
         s->value[1][j][k] = use ? g : 0.0F;
         s->value[2][j][k] = use ? b : 0.0F;
+        s->grey[j][k] = use ? 0.2126F * r + 0.7152F * g + 0.0722F * b : 0.0F;
     }
+}
+
+/* Sites of a mosaic: even columns have colour even, odd ones the other. */
+WEFT_INLINE void read_sites(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first, int even,
+                            int odd, weft_solve_samples *s)
+{
+    float scale[2][LANES];
+    expand(nodes, 2 + 3 * j + even, scale[0]);
+    expand(nodes, 2 + 3 * j + odd, scale[1]);
+    const float *const site = in->rgb[0] + first;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        const float value = site[k] * (k & 1 ? scale[1][k] : scale[0][k]);
+        const int use = (fabsf(value) < 1e30F) & (site[k] >= in->least);
+        s->weight[j][k] = use ? 1.0F : 0.0F;
+        s->value[0][j][k] = use ? value : 0.0F;
+        s->grey[j][k] = use ? value : 0.0F;
+    }
+}
+
+WEFT_INLINE void leave_out(weft_solve_samples *s, int j, const int leave[LANES])
+{
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        s->weight[j][k] = leave[k] ? 0.0F : s->weight[j][k];
+        s->grey[j][k] = leave[k] ? 0.0F : s->grey[j][k];
+    }
+    for (int c = 0; c < s->n_channels; c++)
+#pragma omp simd
+        for (int k = 0; k < LANES; k++)
+            s->value[c][j][k] = leave[k] ? 0.0F : s->value[c][j][k];
 }
 
 WEFT_INLINE void leave_out_clipped(const uint8_t *clipped, int j, weft_solve_samples *s)
 {
-#pragma omp simd
-    for (int k = 0; k < LANES; k++) {
-        const int use = clipped[k] == 0;
-        s->weight[j][k] = use ? s->weight[j][k] : 0.0F;
-        for (int c = 0; c < 3; c++)
-            s->value[c][j][k] = use ? s->value[c][j][k] : 0.0F;
-    }
-}
-
-WEFT_INLINE void make_grey(weft_solve_samples *s, int j)
-{
+    int leave[LANES];
 #pragma omp simd
     for (int k = 0; k < LANES; k++)
-        s->grey[j][k] =
-            0.2126F * s->value[0][j][k] + 0.7152F * s->value[1][j][k] + 0.0722F * s->value[2][j][k];
+        leave[k] = clipped[k] != 0;
+    leave_out(s, j, leave);
 }
 
 /* Takes out what is far darker than the pixel's brightest sample. */
@@ -110,15 +132,13 @@ WEFT_INLINE void leave_out_shadow(weft_solve_samples *s, float part)
 #pragma omp simd
         for (int k = 0; k < LANES; k++)
             limit[k] = s->grey[j][k] > limit[k] ? s->grey[j][k] : limit[k];
-    for (int j = 0; j < s->n_lights; j++)
+    for (int j = 0; j < s->n_lights; j++) {
+        int leave[LANES];
 #pragma omp simd
-        for (int k = 0; k < LANES; k++) {
-            const int use = s->grey[j][k] >= part * limit[k];
-            s->weight[j][k] = use ? s->weight[j][k] : 0.0F;
-            s->grey[j][k] = use ? s->grey[j][k] : 0.0F;
-            for (int c = 0; c < 3; c++)
-                s->value[c][j][k] = use ? s->value[c][j][k] : 0.0F;
-        }
+        for (int k = 0; k < LANES; k++)
+            leave[k] = s->grey[j][k] < part * limit[k];
+        leave_out(s, j, leave);
+    }
 }
 
 /* The last block of a row may be narrower than the lanes: it is worked on in a copy. */
@@ -145,6 +165,7 @@ WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, 
 {
     const weft_incidence *const inc = plan->incidence;
     const int first = block * LANES, n = plan->width - first < LANES ? plan->width - first : LANES;
+    const int even = weft_cfa_colour(plan->cfa, 0, row), odd = weft_cfa_colour(plan->cfa, 1, row);
     float x[LANES], y[LANES];
     interpolate_nodes(inc, row, block, nodes);
     expand(nodes, 0, x);
@@ -154,22 +175,25 @@ WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, 
         const bool whole = n == LANES;
         const weft_solve_row_in source = whole ? in[j] : copy_margin(&in[j], first, n, &m);
         point_at_light(inc, j, x, y, s);
-        read_light(nodes, j, &source, whole ? first : 0, s);
+        if (plan->cfa == WEFT_CFA_NONE)
+            read_colours(nodes, j, &source, whole ? first : 0, s);
+        else
+            read_sites(nodes, j, &source, whole ? first : 0, even, odd, s);
         if (source.clipped)
             leave_out_clipped(source.clipped + (whole ? first : 0), j, s);
-        make_grey(s, j);
     }
     if (plan->shadow > 0)
         leave_out_shadow(s, plan->shadow);
 }
 
-static void scatter(const weft_solve_answers *a, const weft_solve_row_out *out, int first, int n)
+static void scatter(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out, int first,
+                    int n)
 {
     const size_t bytes = (size_t)n * sizeof(float);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
         memcpy(out->normal[c] + first, a->normal[c], bytes);
+    for (int c = 0; c < n_channels; c++)
         memcpy(out->albedo[c] + first, a->albedo[c], bytes);
-    }
     memcpy(out->residual + first, a->residual, bytes);
     memcpy(out->confidence + first, a->confidence, bytes);
     for (int k = 0; k < n; k++)
@@ -188,10 +212,11 @@ void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_i
         nodes.part[k] = (float)inside / (float)(1 << nodes.step_log2);
     }
     samples.n_lights = plan->incidence->n_lights;
+    samples.n_channels = plan->cfa == WEFT_CFA_NONE ? 3 : 1;
     for (int first = 0; first < plan->width; first += LANES) {
         const int n = plan->width - first < LANES ? plan->width - first : LANES;
         gather(plan, row, first / LANES, in, &nodes, &samples);
         plan->method(&samples, &answers);
-        scatter(&answers, out, first, n);
+        scatter(&answers, samples.n_channels, out, first, n);
     }
 }

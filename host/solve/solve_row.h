@@ -7,15 +7,16 @@
 
 /** One row under one light. */
 typedef struct weft_solve_row_in {
-    const float *rgb[3];    /* [width] linear values (1/s); all three the same for a grey picture */
+    const float *rgb[3];    /* [width] linear values (1/s); all three the same for grey and mosaics */
     const uint8_t *clipped; /* [width] non-zero: not to be used; NULL: none */
     float least;            /* the largest channel must reach this (3 sigma of black); 0: no rule */
 } weft_solve_row_in;
 
 /** Where the answers of a row go; all [width]. */
 typedef struct weft_solve_row_out {
-    float *normal[3], *albedo[3], *residual, *confidence;
-    uint8_t *valid; /* 255 or 0 */
+    float *normal[3], *residual, *confidence;
+    float *albedo[3]; /* of a mosaic only [0] is written: each site's own colour */
+    uint8_t *valid;   /* 255 or 0 */
 } weft_solve_row_out;
 
 /** What is the same for every row. */
@@ -23,16 +24,21 @@ typedef struct weft_solve_plan {
     const weft_incidence *incidence;
     weft_solve_fn *method;
     int width;
+    weft_cfa cfa; /* rows are of a mosaic and every site is solved by its own colour; or NONE */
     float shadow; /* samples below this part of the pixel's brightest I' are left out; 0: none */
 } weft_solve_plan;
 
 /**
  * Solves one row.
  *
+ * A mosaic needs no demosaicing here: all samples of a site are of one colour, and the normal does not ask
+ * which.  Colours made up from neighbours under ten lights would blur the normals of fine weave by degrees.
+ *
  * A sample is left out when it is clipped, not finite, below `least`, or where its light does not shine.
  * Pure and without allocation; from any thread.  The same input gives the same bits on any thread.
  *
  * @param in   [n_lights]
+ * @param row  its parity tells the colours of a mosaic
  * @param out  every element is written
  */
 void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,

@@ -65,6 +65,7 @@ expect 2 '--calibration' "$weft" solve flat.set -o x
 expect 2 'there are: lsq' "$weft" solve flat.set -c flat.cal -o x --method robuster
 expect 1 'absent.cal' "$weft" solve flat.set -c absent.cal -o x
 expect 1 'absent.set' "$weft" solve absent.set -c flat.cal -o x
+expect 1 'there is no folder nowhere' "$weft" solve flat.set -c flat.cal -o nowhere/x
 expect 1 'weft calibrate lens' "$weft" solve flat.set -c flat.cal -o x --geometry plane
 rm flat/p3.png
 expect 1 'p3.png' "$weft" solve flat.set -c flat.cal -o x

@@ -52,7 +52,7 @@ static void begin(double height_mm)
     draw(height_mm);
     assert_ok(
         weft_incidence_init(&s.incidence, &s.cal, WIDTH, HEIGHT, (weft_pixel_scale){1, 0}, height_mm, err));
-    s.plan = (weft_solve_plan){&s.incidence, weft_solve_lsq, WIDTH, 0};
+    s.plan = (weft_solve_plan){&s.incidence, weft_solve_lsq, WIDTH, WEFT_CFA_NONE, 0};
 }
 
 static void end(void)
@@ -71,11 +71,11 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
         for (int j = 0; j < N; j++)
             in[j] =
                 (weft_solve_row_in){{s.rgb[j][0][v], s.rgb[j][1][v], s.rgb[j][2][v]}, s.clipped[j][v], least};
-        const weft_solve_row_out out = {{s.out[0][v], s.out[1][v], s.out[2][v]},
-                                        {s.out[3][v], s.out[4][v], s.out[5][v]},
-                                        s.out[6][v],
-                                        s.out[7][v],
-                                        s.valid[v]};
+        const weft_solve_row_out out = {.normal = {s.out[0][v], s.out[1][v], s.out[2][v]},
+                                        .albedo = {s.out[3][v], s.out[4][v], s.out[5][v]},
+                                        .residual = s.out[6][v],
+                                        .confidence = s.out[7][v],
+                                        .valid = s.valid[v]};
         weft_solve_row(&s.plan, v, in, &out);
     }
 }
@@ -120,6 +120,32 @@ static void test_exact_light_gives_exact_normals(void **state)
     end();
 }
 
+/* A mosaic whose sites see one colour each: normals as exact, and each site's own albedo. */
+static void test_mosaic_needs_no_other_colours(void **state)
+{
+    (void)state;
+    begin(0);
+    s.plan.cfa = WEFT_CFA_GBRG;
+    for (int j = 0; j < N; j++)
+        for (int v = 0; v < HEIGHT; v++)
+            for (int u = 0; u < WIDTH; u++)
+                s.rgb[j][0][v][u] = s.rgb[j][weft_cfa_colour(WEFT_CFA_GBRG, u, v)][v][u];
+    s.clipped[4][20][31] = 1;
+    s.rgb[4][0][20][31] = 1e9F;
+    solve();
+    double worst = 0, worst_albedo = 0;
+    for (int v = 0; v < HEIGHT; v++)
+        for (int u = 0; u < WIDTH; u++) {
+            const double own = s.albedo[v][u][weft_cfa_colour(WEFT_CFA_GBRG, u, v)];
+            worst = fmax(worst, normal_error(u, v));
+            worst_albedo = fmax(worst_albedo, fabs((double)s.out[3][v][u] / own - 1));
+            assert_true(s.out[4][v][u] == 0 && s.out[5][v][u] == 0);
+        }
+    print_message("worst normal %.2g degrees, worst albedo %.2g relative\n", worst, worst_albedo);
+    assert_true(worst < 0.002 && worst_albedo < 5e-5);
+    end();
+}
+
 static void test_height_of_the_cloth(void **state)
 {
     (void)state;
@@ -150,6 +176,7 @@ static void test_half_size_pixels_lie_between_sites(void **state)
 static void random_samples(weft_solve_samples *samples, uint64_t *random, double drop)
 {
     samples->n_lights = N;
+    samples->n_channels = 3;
     for (int k = 0; k < LANES; k++) {
         const double normal[3] = {weft_test_gauss(random) * 0.4, weft_test_gauss(random) * 0.4, 1};
         for (int j = 0; j < N; j++) {
@@ -235,7 +262,7 @@ static void test_shared_vectors(void **state)
         char *p = line;
         for (int i = 0; i < 54; i++, p++)
             x[i] = strtod(p, &p);
-        weft_solve_samples samples = {.n_lights = N};
+        weft_solve_samples samples = {.n_lights = N, .n_channels = 3};
         weft_solve_answers answers;
         for (int j = 0; j < N; j++) {
             for (int c = 0; c < 3; c++) {
@@ -353,7 +380,7 @@ static void test_too_few_or_badly_placed_lights_give_no_answer(void **state)
 static void test_lights_in_one_plane_give_no_answer(void **state)
 {
     (void)state;
-    weft_solve_samples samples = {.n_lights = 4};
+    weft_solve_samples samples = {.n_lights = 4, .n_channels = 3};
     weft_solve_answers answers;
     for (int k = 0; k < LANES; k++) /* lane k: the fourth light leaves the plane y = 0 by ever more */
         for (int j = 0; j < 4; j++) {
@@ -479,6 +506,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exact_light_gives_exact_normals),
+        cmocka_unit_test(test_mosaic_needs_no_other_colours),
         cmocka_unit_test(test_height_of_the_cloth),
         cmocka_unit_test(test_half_size_pixels_lie_between_sites),
         cmocka_unit_test(test_agrees_with_svd),
