@@ -154,20 +154,40 @@ typedef struct render {
     weft_image *picture;
 } render;
 
-/* Adds a run of samples to a row of the picture under a tent two pixels wide. */
-static void splat_run(const render *r, const weft_preview_samples *s, int first, int row, double row_weight)
+/* Where a line of samples falls in the picture: on two rows, by the tent. */
+typedef struct splat_target {
+    int row[2]; /* -1: not in this band */
+    double weight[2];
+} splat_target;
+
+static void add_to_row(float *to, int width, int left, const double *sums, int n, double weight)
 {
-    const int width = r->picture->width, ss = r->setup->supersampling;
+    const int begin = left < 0 ? -left : 0, end = left + n > width ? width - left : n;
+    for (int p = begin; p < end; p++)
+        to[left + p] += (float)(weight * sums[p]);
+}
+
+/* Adds a run of samples to the picture under a tent two pixels wide: along the line first. */
+static void splat_run(const render *r, const weft_preview_samples *s, int first, const splat_target *target)
+{
+    const int ss = r->setup->supersampling, begin = first + ss / 2; /* samples from the left neighbour on */
+    const int n_pixels = (begin + s->n - 1) / ss - begin / ss + 2;
+    double sums[WEFT_PREVIEW_RUN / 2 + 2];
     for (int c = 0; c < 3; c++) {
-        float *const to = weft_image_row(r->picture, c, row);
+        int pixel = 0, k = begin % ss;
+        for (int p = 0; p < n_pixels; p++)
+            sums[p] = 0;
         for (int i = 0; i < s->n; i++) {
-            const double px = (first + i + 0.5) / ss - 0.5, left = floor(px), right_weight = px - left;
-            const int at = (int)left;
-            if (at >= 0)
-                to[at] += (float)(row_weight * (1 - right_weight) * s->value[c][i]);
-            if (at + 1 < width)
-                to[at + 1] += (float)(row_weight * right_weight * s->value[c][i]);
+            const double right = (k + 0.5) / ss;
+            sums[pixel] += (1 - right) * s->value[c][i];
+            sums[pixel + 1] += right * s->value[c][i];
+            k = k + 1 < ss ? k + 1 : 0;
+            pixel += k == 0;
         }
+        for (int j = 0; j < 2; j++)
+            if (target->row[j] >= 0)
+                add_to_row(weft_image_row(r->picture, c, target->row[j]), r->picture->width, begin / ss - 1,
+                           sums, n_pixels, target->weight[j]);
     }
 }
 
@@ -203,14 +223,14 @@ static void render_rows(void *context, int band, int row_begin, int row_end)
     for (int line = row_begin * ss - ss / 2; line < row_end * ss + ss / 2; line++) {
         const double py = (line + 0.5) / ss - 0.5, top = floor(py), lower = py - top;
         const int row = (int)top;
+        const splat_target target = {.row = {row >= row_begin && row < row_end ? row : -1,
+                                             row + 1 >= row_begin && row + 1 < row_end ? row + 1 : -1},
+                                     .weight = {(1 - lower) / (ss * ss), lower / (ss * ss)}};
         for (int first = -ss / 2; first < last_column; first += WEFT_PREVIEW_RUN) {
             const int rest = last_column - first;
             shade_run(setup, &s, first, rest < WEFT_PREVIEW_RUN ? rest : WEFT_PREVIEW_RUN,
                       height / 2.0 - (py + 0.5));
-            if (row >= row_begin && row < row_end)
-                splat_run(r, &s, first, row, (1 - lower) / (ss * ss));
-            if (row + 1 >= row_begin && row + 1 < row_end)
-                splat_run(r, &s, first, row + 1, lower / (ss * ss));
+            splat_run(r, &s, first, &target);
         }
     }
 }

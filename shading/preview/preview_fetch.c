@@ -1,90 +1,133 @@
 #include "shading/preview/samples.h"
 
+#include "core/clones.h"
 #include "shading/brdf/half.h"
 
-/* The four texels around a place and their shares; masked ones have none. */
+/* The four texels around each place and their shares; masked ones have none. */
 typedef struct taps {
-    size_t at[4];
-    double share[4];
-    double sign[3]; /* of the normal: -1 where a mirrored repeat turned the axis round */
+    int at[4][WEFT_PREVIEW_RUN];
+    double share[4][WEFT_PREVIEW_RUN];
+    double sign[3][WEFT_PREVIEW_RUN]; /* of the normal: -1 where a mirrored repeat turned the axis round */
 } taps;
 
 /* Folds a coordinate into 0..size-1 by mirroring at the edges of the texels (-0.5 and size - 0.5). */
-static double mirror(double t, int size, double *sign)
+static inline double mirror(double t, double size, double *sign)
 {
-    const double period = 2.0 * size, from_edge = t + 0.5;
-    const double within = from_edge - period * floor(from_edge / period);
+    const double periods = (t + 0.5) / (2 * size), within = 2 * size * (periods - floor(periods));
+    const double folded = (within < size ? within : 2 * size - within) - 0.5;
     *sign = within < size ? 1 : -1;
-    const double folded = (within < size ? within : period - within) - 0.5;
     return folded < 0 ? 0 : folded > size - 1 ? size - 1 : folded;
 }
 
-/* @return the share of the place that is not masked, 0..1 */
-static double place_taps(const weft_preview_setup *setup, double u, double v, taps *t)
+WEFT_CLONES
+static void place_taps(const weft_preview_setup *setup, const weft_preview_samples *s, taps *t)
 {
     const weft_preview_crop crop = setup->crop;
-    const weft_mask *const mask = setup->surface->mask;
-    t->sign[2] = 1;
-    const double x = crop.x + mirror(u, crop.width, &t->sign[0]);
-    const double y = crop.y + mirror(v, crop.height, &t->sign[1]);
-    const int x0 = (int)x, y0 = (int)y;
-    const int x1 = x0 + 1 < crop.x + crop.width ? x0 + 1 : x0,
-              y1 = y0 + 1 < crop.y + crop.height ? y0 + 1 : y0;
-    const double fx = x - x0, fy = y - y0;
-    const int columns[4] = {x0, x1, x0, x1}, rows[4] = {y0, y0, y1, y1};
-    const double shares[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
-    double sum = 0;
-    for (int k = 0; k < 4; k++) {
-        t->at[k] = (size_t)rows[k] * (size_t)setup->surface->width + (size_t)columns[k];
-        t->share[k] = !mask || mask->data[t->at[k]] ? shares[k] : 0;
-        sum += t->share[k];
+    const int right = crop.x + crop.width - 1, bottom = crop.y + crop.height - 1;
+    const int stride = setup->surface->width;
+    WEFT_INDEPENDENT
+    for (int i = 0; i < s->n; i++) {
+        double sign_x, sign_y;
+        const double x = crop.x + mirror(s->u[i], crop.width, &sign_x);
+        const double y = crop.y + mirror(s->v[i], crop.height, &sign_y);
+        const int x0 = (int)x, y0 = (int)y, x1 = x0 < right ? x0 + 1 : x0, y1 = y0 < bottom ? y0 + 1 : y0;
+        const double fx = x - x0, fy = y - y0;
+        t->at[0][i] = y0 * stride + x0;
+        t->at[1][i] = y0 * stride + x1;
+        t->at[2][i] = y1 * stride + x0;
+        t->at[3][i] = y1 * stride + x1;
+        t->share[0][i] = (1 - fx) * (1 - fy);
+        t->share[1][i] = fx * (1 - fy);
+        t->share[2][i] = (1 - fx) * fy;
+        t->share[3][i] = fx * fy;
+        t->sign[0][i] = sign_x;
+        t->sign[1][i] = sign_y;
+        t->sign[2][i] = 1;
     }
-    for (int k = 0; k < 4 && sum > 0; k++)
-        t->share[k] /= sum;
-    return sum;
 }
 
-static double fetch(const weft_image *image, int plane, const taps *t)
+/* Takes the shares of masked texels away; where most is masked, so is the place. */
+static void apply_mask(const weft_mask *mask, weft_preview_samples *s, taps *t)
+{
+    for (int i = 0; i < s->n; i++) {
+        double sum = 0;
+        for (int k = 0; k < 4; k++) {
+            t->share[k][i] = mask->data[t->at[k][i]] ? t->share[k][i] : 0;
+            sum += t->share[k][i];
+        }
+        for (int k = 0; k < 4 && sum > 0; k++)
+            t->share[k][i] /= sum;
+        if (sum < 0.5)
+            s->hit[i] = 0;
+    }
+}
+
+WEFT_CLONES
+static void fetch(const weft_image *image, int plane, const taps *t, int n, double *to)
 {
     const float *const from = weft_image_plane(image, plane);
-    double sum = 0;
-    for (int k = 0; k < 4; k++)
-        sum += t->share[k] > 0 ? t->share[k] * (double)from[t->at[k]] : 0;
-    return sum;
+    WEFT_INDEPENDENT
+    for (int i = 0; i < n; i++) {
+        double sum = 0;
+        for (int k = 0; k < 4; k++) {
+            const double texel = (double)from[t->at[k][i]];
+            sum += t->share[k][i] > 0 ? t->share[k][i] * texel : 0; /* a masked texel may be NaN */
+        }
+        to[i] = sum;
+    }
 }
 
-static void fetch_normal(const weft_preview_setup *setup, const taps *t, weft_preview_samples *s, int i)
+WEFT_CLONES
+static void fetch_normals(const weft_image *normal, const taps *t, weft_preview_samples *s)
 {
-    double n[3] = {0, 0, 1};
-    if (setup->surface->normal) {
-        for (int c = 0; c < 3; c++)
-            n[c] = t->sign[c] * fetch(setup->surface->normal, c, t);
-        const double length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-        const double inverse = length2 > 1e-12 ? 1 / sqrt(length2) : 0; /* NaN fails the test too */
-        for (int c = 0; c < 3; c++)
-            n[c] = inverse > 0 ? n[c] * inverse : c == 2;
-    }
     for (int c = 0; c < 3; c++)
-        s->normal[c][i] = n[c];
+        fetch(normal, c, t, s->n, s->normal[c]);
+    WEFT_INDEPENDENT
+    for (int i = 0; i < s->n; i++) {
+        const double x = t->sign[0][i] * s->normal[0][i], y = t->sign[1][i] * s->normal[1][i];
+        const double z = s->normal[2][i], length2 = x * x + y * y + z * z;
+        const double known = length2 > 1e-12 ? 1 : 0; /* NaN fails the test too */
+        const double inverse = 1 / sqrt(known > 0 ? length2 : 1);
+        s->normal[0][i] = known > 0 ? x * inverse : 0;
+        s->normal[1][i] = known > 0 ? y * inverse : 0;
+        s->normal[2][i] = known > 0 ? z * inverse : 1;
+    }
+}
+
+static void flat_normals(weft_preview_samples *s)
+{
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < s->n; i++)
+            s->normal[c][i] = c == 2;
+}
+
+WEFT_CLONES
+static void clamp(double *values, int n, double low, double high)
+{
+    WEFT_INDEPENDENT
+    for (int i = 0; i < n; i++) { /* NaN fails both tests and becomes the lower end */
+        const double above = values[i] > low ? values[i] : low;
+        values[i] = above < high ? above : high;
+    }
 }
 
 void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_surface *const surface = setup->surface;
-    const int n_planes = weft_brdf_n_planes(surface->brdf);
-    for (int i = 0; i < s->n; i++) {
-        taps t = {0};
-        if (s->hit[i] > 0 && place_taps(setup, s->u[i], s->v[i], &t) < 0.5)
-            s->hit[i] = 0;
-        fetch_normal(setup, &t, s, i);
-        for (int k = 0; k < n_planes; k++) {
-            const weft_preview_map map = surface->maps[k];
-            double value = surface->params[k];
-            if (map.image)
-                value = fetch(map.image, map.plane, &t);
-            /* NaN fails both tests and becomes the lower end */
-            s->param[k][i] =
-                value > setup->low[k] ? (value < setup->high[k] ? value : setup->high[k]) : setup->low[k];
-        }
+    taps t;
+    place_taps(setup, s, &t);
+    if (surface->mask)
+        apply_mask(surface->mask, s, &t);
+    if (surface->normal)
+        fetch_normals(surface->normal, &t, s);
+    else
+        flat_normals(s);
+    for (int k = 0; k < weft_brdf_n_planes(surface->brdf); k++) {
+        const weft_preview_map map = surface->maps[k];
+        if (map.image)
+            fetch(map.image, map.plane, &t, s->n, s->param[k]);
+        for (int i = 0; i < s->n && !map.image; i++)
+            s->param[k][i] = surface->params[k];
+        clamp(s->param[k], s->n, setup->low[k], setup->high[k]);
     }
 }
