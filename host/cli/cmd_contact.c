@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { COLUMNS = 4, ROWS_PER_INPUT = 2, N_LIGHTS = 3 };
+enum { COLUMNS = 5, ROWS_PER_INPUT = 2, N_LIGHTS = 3 };
 
 typedef struct contact_args {
     const char *output, *brdf;
@@ -57,7 +57,7 @@ static const weft_field fields[] = {
      .unit = "EV",
      .min = -20,
      .max = 20,
-     .def = "1",
+     .def = "0.5",
      .help = "of the previews; at 0 a white card that faces the light is just white"},
     {.key = "repeat",
      .type = WEFT_FIELD_F64,
@@ -75,6 +75,7 @@ typedef struct block {
     int first_row;
     const contact_args *args;
     const weft_preview_input *input;
+    weft_preview_crop detail; /* pixels from the middle of the sample, as many as a tile has */
 } block;
 
 static weft_err place(const block *b, int tile, const weft_image *picture, const char *label, weft_error *err)
@@ -129,8 +130,31 @@ static weft_err place_confidence(const block *b, int tile, weft_error *err)
     return place_and_release(b, tile, &picture, "confidence 0..1", err);
 }
 
+static weft_err place_normal_detail(const block *b, int tile, weft_error *err)
+{
+    const weft_preview_crop d = b->detail;
+    weft_image part, picture;
+    WEFT_TRY(weft_image_crop(&part, &b->input->maps.normal, d.x, d.y, d.width, d.height, err));
+    const weft_err status = weft_sheet_show_normals(&picture, &part, err);
+    weft_image_fini(&part);
+    WEFT_TRY(status);
+    return place_and_release(b, tile, &picture, "normal, pixel by pixel", err);
+}
+
+/* The middle of what is shown, as many pixels as a tile has. */
+static weft_err find_detail(block *b, weft_error *err)
+{
+    weft_preview_crop whole;
+    WEFT_TRY(weft_preview_whole(&b->input->surface, &whole, err));
+    const int width = b->args->tile.width < whole.width ? b->args->tile.width : whole.width;
+    const int height = b->args->tile.height < whole.height ? b->args->tile.height : whole.height;
+    b->detail = (weft_preview_crop){whole.x + (whole.width - width) / 2,
+                                    whole.y + (whole.height - height) / 2, width, height};
+    return WEFT_OK;
+}
+
 static weft_err place_preview(const block *b, int tile, weft_preview_shape shape, const double angles[2],
-                              weft_error *err)
+                              const weft_preview_crop *detail, weft_error *err)
 {
     weft_preview_view view = weft_preview_view_defaults();
     weft_image picture;
@@ -142,30 +166,39 @@ static weft_err place_preview(const block *b, int tile, weft_preview_shape shape
     view.ambient = 0.02;
     view.background = shape == WEFT_PREVIEW_SPHERE ? WEFT_SHEET_NONE : WEFT_SHEET_GROUND;
     view.repeat = b->args->repeat;
+    if (detail)
+        view.crop = *detail;
     weft_preview_direction(angles[0], angles[1], view.light.direction);
     WEFT_TRY(weft_preview_render(&b->input->surface, &view, &picture, err));
     snprintf(label, sizeof label, "%s, light %g, %g",
-             shape == WEFT_PREVIEW_SPHERE ? "ball" : b->input->surface.brdf->name, angles[0], angles[1]);
+             shape == WEFT_PREVIEW_SPHERE ? "ball"
+             : detail                     ? "detail"
+                                          : b->input->surface.brdf->name,
+             angles[0], angles[1]);
     return place_and_release(b, tile, &picture, label, err);
 }
 
 /* Maps above, previews below; what the folder does not have stays empty. */
-static weft_err fill_block(const block *b, weft_error *err)
+static weft_err fill_block(block *b, weft_error *err)
 {
-    static const double ball_light[2] = {135, 40}; /* from the upper left, as in most pictures of materials */
+    static const double upper_left[2] = {135, 40}; /* as in most pictures of materials */
     const weft_maps *const maps = &b->input->maps;
+    WEFT_TRY(find_detail(b, err));
     if (maps->albedo.planes)
         WEFT_TRY(place_albedo(b, 0, err));
-    if (maps->normal.planes)
+    if (maps->normal.planes) {
         WEFT_TRY(place_normal(b, 1, err));
+        WEFT_TRY(place_normal_detail(b, 2, err));
+    }
     if (maps->residual.planes)
-        WEFT_TRY(place_residual(b, 2, err));
+        WEFT_TRY(place_residual(b, 3, err));
     if (maps->confidence.planes)
-        WEFT_TRY(place_confidence(b, 3, err));
+        WEFT_TRY(place_confidence(b, 4, err));
     for (int light = 0; light < N_LIGHTS; light++)
         WEFT_TRY(place_preview(b, COLUMNS + light, WEFT_PREVIEW_PLANE,
-                               b->args->lights.values + (size_t)2 * (size_t)light, err));
-    return place_preview(b, COLUMNS + N_LIGHTS, WEFT_PREVIEW_SPHERE, ball_light, err);
+                               b->args->lights.values + (size_t)2 * (size_t)light, NULL, err));
+    WEFT_TRY(place_preview(b, COLUMNS + N_LIGHTS, WEFT_PREVIEW_PLANE, upper_left, &b->detail, err));
+    return place_preview(b, COLUMNS + N_LIGHTS + 1, WEFT_PREVIEW_SPHERE, upper_left, NULL, err);
 }
 
 static char *sheet_title(const weft_invocation *inv, weft_error *err)
@@ -190,7 +223,8 @@ static weft_err fill_sheet(const weft_invocation *inv, const contact_args *a, we
     for (int i = 0; i < inv->n_operands; i++) {
         weft_preview_input input;
         WEFT_TRY(weft_preview_input_load(&input, inv->operands[i], a->brdf, &a->params, err));
-        const weft_err status = fill_block(&(block){sheet, i * ROWS_PER_INPUT, a, &input}, err);
+        const weft_err status = fill_block(
+            &(block){.sheet = sheet, .first_row = i * ROWS_PER_INPUT, .args = a, .input = &input}, err);
         weft_preview_input_fini(&input);
         if (status != WEFT_OK)
             return weft_prefix(err, status, "%s", inv->operands[i]);

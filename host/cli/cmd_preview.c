@@ -12,7 +12,7 @@
 typedef struct preview_args {
     const char *output, *brdf;
     weft_texts params;
-    weft_numbers light, light_mm;
+    weft_numbers light, light_mm, crop;
     int shape;
     weft_size size;
     double exposure_ev, ambient, background, repeat, fov_deg;
@@ -59,6 +59,11 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_SIZE,
      .offset = offsetof(preview_args, size),
      .help = "of the picture; without it a plane keeps its pixels up to 1600, a ball gets 768x768"},
+    {.key = "crop",
+     .type = WEFT_FIELD_F64S,
+     .offset = offsetof(preview_args, crop),
+     .unit = "X,Y,W,H",
+     .help = "show only this rectangle of the map, in its pixels"},
     {.key = "exposure",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(preview_args, exposure_ev),
@@ -116,15 +121,29 @@ static weft_err set_light(weft_preview_light *light, const preview_args *a, weft
     return WEFT_OK;
 }
 
-static weft_size picture_size(const preview_args *a, const weft_maps *maps)
+static weft_err set_crop(weft_preview_crop *crop, const weft_numbers *given, weft_error *err)
+{
+    const double *const v = given->values;
+    if (given->n == 0)
+        return WEFT_OK;
+    for (int i = 0; i < given->n; i++)
+        if (v[i] != (int)v[i] || v[i] < (i < 2 ? 0 : 1) || v[i] > WEFT_IMAGE_MAX_SIDE)
+            return weft_fail(err, WEFT_ERR_USAGE, "--crop wants whole pixels X,Y,W,H");
+    if (given->n != 4)
+        return weft_fail(err, WEFT_ERR_USAGE, "--crop wants four numbers X,Y,W,H");
+    *crop = (weft_preview_crop){(int)v[0], (int)v[1], (int)v[2], (int)v[3]};
+    return WEFT_OK;
+}
+
+static weft_size picture_size(const preview_args *a, const weft_preview_crop *shown)
 {
     if (a->size.width)
         return a->size;
     if (a->shape == WEFT_PREVIEW_SPHERE)
         return (weft_size){768, 768};
-    const int longest = maps->width > maps->height ? maps->width : maps->height;
+    const int longest = shown->width > shown->height ? shown->width : shown->height;
     const double scale = longest > LONGEST_SIDE ? (double)LONGEST_SIDE / longest : 1;
-    return (weft_size){(int)fmax(1, maps->width * scale + 0.5), (int)fmax(1, maps->height * scale + 0.5)};
+    return (weft_size){(int)fmax(1, shown->width * scale + 0.5), (int)fmax(1, shown->height * scale + 0.5)};
 }
 
 static weft_err report(const weft_invocation *inv, const preview_args *a, weft_size size, double seconds,
@@ -139,37 +158,48 @@ static weft_err report(const weft_invocation *inv, const preview_args *a, weft_s
     return WEFT_OK;
 }
 
+/* Renders and writes; `view` has its light and crop. */
+static weft_err look(const preview_args *a, const weft_preview_input *input, weft_preview_view *view,
+                     double *seconds, weft_error *err)
+{
+    weft_image picture;
+    weft_preview_crop shown = view->crop;
+    struct timespec begin, end;
+    if (shown.width == 0)
+        WEFT_TRY(weft_preview_whole(&input->surface, &shown, err));
+    const weft_size size = picture_size(a, &shown);
+    view->width = size.width;
+    view->height = size.height;
+    view->shape = (weft_preview_shape)a->shape;
+    view->exposure_ev = a->exposure_ev;
+    view->ambient = a->ambient;
+    view->background = a->background;
+    view->repeat = a->repeat;
+    view->fov_deg = a->fov_deg;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    WEFT_TRY(weft_preview_render(&input->surface, view, &picture, err));
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    *seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+    const weft_err status = weft_image_write(a->output, &picture, 8, WEFT_TRANSFER_SRGB, err);
+    weft_image_fini(&picture);
+    return status;
+}
+
 static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const preview_args *const a = args;
     weft_preview_view view = weft_preview_view_defaults();
     weft_preview_input input;
-    weft_image picture = {0};
-    struct timespec begin, end;
+    double seconds;
     WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     WEFT_TRY(set_light(&view.light, a, err));
+    WEFT_TRY(set_crop(&view.crop, &a->crop, err));
     WEFT_TRY(weft_preview_input_load(&input, inv->operands[0], a->brdf, &a->params, err));
-    const weft_size size = picture_size(a, &input.maps);
-    view.width = size.width;
-    view.height = size.height;
-    view.shape = (weft_preview_shape)a->shape;
-    view.exposure_ev = a->exposure_ev;
-    view.ambient = a->ambient;
-    view.background = a->background;
-    view.repeat = a->repeat;
-    view.fov_deg = a->fov_deg;
-    clock_gettime(CLOCK_MONOTONIC, &begin);
-    weft_err status = weft_preview_render(&input.surface, &view, &picture, err);
-    clock_gettime(CLOCK_MONOTONIC, &end);
-    if (status == WEFT_OK)
-        status = weft_image_write(a->output, &picture, 8, WEFT_TRANSFER_SRGB, err);
-    else
-        status = weft_prefix(err, status, "%s", inv->operands[0]);
-    weft_image_fini(&picture);
+    const weft_err status = look(a, &input, &view, &seconds, err);
     weft_preview_input_fini(&input);
-    WEFT_TRY(status);
-    const double seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
-    return report(inv, a, size, seconds, err);
+    if (status != WEFT_OK)
+        return weft_prefix(err, status, "%s", inv->operands[0]);
+    return report(inv, a, (weft_size){view.width, view.height}, seconds, err);
 }
 
 const weft_command weft_cmd_preview = {

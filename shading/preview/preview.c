@@ -235,7 +235,7 @@ static void render_rows(void *context, int band, int row_begin, int row_end)
     }
 }
 
-static weft_err find_crop(const weft_preview_surface *surface, weft_preview_crop *crop, weft_error *err)
+weft_err weft_preview_whole(const weft_preview_surface *surface, weft_preview_crop *crop, weft_error *err)
 {
     const weft_mask *const mask = surface->mask;
     int x0 = surface->width, y0 = surface->height, x1 = -1, y1 = -1;
@@ -273,6 +273,21 @@ static weft_err check_surface(const weft_preview_surface *surface, const weft_pr
     return WEFT_OK;
 }
 
+static weft_err find_crop(const weft_preview_surface *surface, const weft_preview_view *view,
+                          weft_preview_crop *crop, weft_error *err)
+{
+    const weft_preview_crop wanted = view->crop;
+    if (wanted.width == 0)
+        return weft_preview_whole(surface, crop, err);
+    if (wanted.x < 0 || wanted.y < 0 || wanted.width < 1 || wanted.height < 1 ||
+        wanted.width > surface->width - wanted.x || wanted.height > surface->height - wanted.y)
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "%d x %d pixels from %d, %d on are not inside the map's %d x %d", wanted.width,
+                         wanted.height, wanted.x, wanted.y, surface->width, surface->height);
+    *crop = wanted;
+    return WEFT_OK;
+}
+
 static void set_ranges(weft_preview_setup *setup)
 {
     const weft_brdf *const brdf = setup->surface->brdf;
@@ -294,7 +309,7 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
     weft_preview_setup setup = {.surface = surface, .view = view};
     weft_image made;
     WEFT_TRY(check_surface(surface, view, err));
-    WEFT_TRY(find_crop(surface, &setup.crop, err));
+    WEFT_TRY(find_crop(surface, view, &setup.crop, err));
     set_ranges(&setup);
     weft_preview_setup_shape(&setup);
     WEFT_TRY(weft_image_init(&made, view->width, view->height, 3, err));

@@ -59,16 +59,26 @@ typedef struct weft_preview_surface {
 weft_err weft_preview_set_map(weft_preview_surface *surface, const char *param, const weft_image *image,
                               weft_error *err);
 
+/** A rectangle of map pixels. */
+typedef struct weft_preview_crop {
+    int x, y, width, height;
+} weft_preview_crop;
+
+/** The part of the surface that is shown by default: the box around the mask, or all of it.
+ *  @return WEFT_ERR_NODATA when the mask is empty */
+weft_err weft_preview_whole(const weft_preview_surface *surface, weft_preview_crop *crop, weft_error *err);
+
 /** How it is looked at.  weft_preview_view_defaults() fills it. */
 typedef struct weft_preview_view {
     int width, height;
     weft_preview_shape shape;
     weft_preview_light light;
-    double ambient;     /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
-    double exposure_ev; /* the picture is multiplied by 2^exposure_ev */
-    double background;  /* linear grey, not exposed */
-    double repeat;      /* sphere: how often the shorter side of the map fits half round; > 0 */
-    double fov_deg;     /* 0: orthographic; else the camera's field of view over the shorter side */
+    double ambient;         /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
+    double exposure_ev;     /* the picture is multiplied by 2^exposure_ev */
+    double background;      /* linear grey, not exposed */
+    double repeat;          /* sphere: how often the shorter side of the map fits half round; > 0 */
+    weft_preview_crop crop; /* the part of the map that is shown; width 0: weft_preview_whole() */
+    double fov_deg;         /* 0: orthographic; else the camera's field of view over the shorter side */
 } weft_preview_view;
 
 /** 512 x 512, plane, light from the upper left at 45 degrees, ambient 0, background 0.18, repeat 1. */

@@ -22,11 +22,6 @@ typedef struct weft_preview_samples {
     double value[3][WEFT_PREVIEW_RUN];                            /* BRDF, then radiance */
 } weft_preview_samples;
 
-/** The part of the map that is shown: the box around the mask. */
-typedef struct weft_preview_crop {
-    int x, y, width, height;
-} weft_preview_crop;
-
 /** What is the same for all samples of a picture. */
 typedef struct weft_preview_setup {
     const weft_preview_surface *surface;

@@ -4,6 +4,7 @@
 #include "core/mem.h"
 #include "shading/preview/font.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -77,6 +78,20 @@ weft_err weft_image_scale(weft_image *scaled, const weft_image *image, int width
     else
         *scaled = made;
     return status;
+}
+
+weft_err weft_image_crop(weft_image *part, const weft_image *image, int x, int y, int width, int height,
+                         weft_error *err)
+{
+    weft_image made;
+    assert(x >= 0 && y >= 0 && x + width <= image->width && y + height <= image->height);
+    WEFT_TRY(weft_image_init(&made, width, height, image->planes, err));
+    for (int p = 0; p < image->planes; p++)
+        for (int row = 0; row < height; row++)
+            memcpy(weft_image_row(&made, p, row), weft_image_row(image, p, y + row) + x,
+                   (size_t)width * sizeof(float));
+    *part = made;
+    return WEFT_OK;
 }
 
 /* Cuts a label to what fits; the text keeps its end, which tells files of one folder apart. */

@@ -31,6 +31,10 @@ weft_err weft_sheet_place(weft_sheet *sheet, int column, int row, const weft_ima
 weft_err weft_image_scale(weft_image *scaled, const weft_image *image, int width, int height,
                           weft_error *err);
 
+/** Copies a rectangle, which must lie inside. */
+weft_err weft_image_crop(weft_image *part, const weft_image *image, int x, int y, int width, int height,
+                         weft_error *err);
+
 /** A linear picture whose masked places are grey; mask may be NULL. */
 weft_err weft_sheet_show_colour(weft_image *picture, const weft_image *colour, const weft_mask *mask,
                                 weft_error *err);

@@ -33,7 +33,7 @@ expect 0 '"width":64' "$weft" preview weave.maps/ -o ball.png --json --shape sph
     --size 64x48 --fov 20 --light 60,20
 is_png ball.png 64 48
 expect 0 'point.exr' "$weft" preview weave.maps -o point.exr --light-mm=-20,0,40 --brdf ggx --param alpha=weave.maps/confidence.exr
-expect 0 'sheet.png: 1740 x ' "$weft" contact weave.maps sensor.maps -o sheet.png
+expect 0 'sheet.png: 2172 x ' "$weft" contact weave.maps sensor.maps -o sheet.png
 
 # light from the left brightens the left flanks: the picture under 180,30 and under 0,30 must differ, and the
 # same command must give the same bytes
@@ -49,6 +49,10 @@ expect 2 'output' "$weft" preview weave.maps
 expect 2 'no such BRDF; there are' "$weft" preview weave.maps -o x.png --brdf gxx
 expect 2 'it has albedo' "$weft" preview weave.maps -o x.png --param alpha=1
 expect 2 'AZ,EL' "$weft" preview weave.maps -o x.png --light 1
+expect 0 'crop.png: 50 x 40' "$weft" preview weave.maps -o crop.png --crop 10,20,50,40
+expect 1 'not inside' "$weft" preview weave.maps -o x.png --crop 380,20,50,40
+expect 2 'whole pixels' "$weft" preview weave.maps -o x.png --crop 0,0,1.5,4
+expect 2 'four numbers' "$weft" preview weave.maps -o x.png --crop 0,0,4
 expect 2 'X,Y,Z' "$weft" preview weave.maps -o x.png --light-mm 0,0,0
 expect 2 'six numbers' "$weft" contact weave.maps -o x.png --lights 1,2
 expect 1 'have none' "$weft" preview sensor.maps -o x.png --light-mm 0,0,100

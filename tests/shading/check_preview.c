@@ -236,6 +236,14 @@ static void test_mask_shows_the_background(void **state)
     assert_near(pixel(&picture, 0, 3, 3), 0.18, 1e-6);
     assert_near(pixel(&picture, 0, 39, 0), 0.6, 1e-6);
     assert_near(pixel(&picture, 0, 12, 30), 0.6, 1e-6);
+    weft_image_fini(&picture);
+    view.crop = (weft_preview_crop){12, 12, 16, 16}; /* half of it lies in the notch */
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    assert_near(pixel(&picture, 0, 10, 10), 0.18, 1e-6);
+    assert_near(pixel(&picture, 0, 30, 30), 0.6, 1e-6);
+    view.crop.x = 50;
+    assert_fails(weft_preview_render(&surface, &view, &(weft_image){0}, err), WEFT_ERR_RANGE, "not inside");
+    view.crop.width = 0;
     memset(mask.data, 0, 3600);
     assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_NODATA, "mask is empty");
     weft_mask_fini(&mask);
