@@ -37,7 +37,8 @@ weft_err weft_tiff_open(TIFF **tiff, const char *file, const char *mode, weft_ti
     if (*tiff)
         return WEFT_OK;
     return reading ? weft_tiff_damaged(log, err)
-                   : weft_fail(err, WEFT_ERR_IO, "%s: cannot be written: %s", log->path, log->text);
+                   : weft_fail(err, WEFT_ERR_IO, "%s: cannot be written: %s; is the disk full?", log->path,
+                               log->text);
 }
 
 weft_err weft_tiff_damaged(const weft_tiff_log *log, weft_error *err)

@@ -236,7 +236,7 @@ weft_err aravis_set_exposure(const aravis_camera *a, double exposure_s, double *
     ARAVIS_TRY(a, "reading back the exposure", us = arv_camera_get_exposure_time(a->camera, &error));
     if (us <= 0)
         return weft_fail(err, WEFT_ERR_PROTOCOL, "camera %s: says its exposure is %g us", a->address, us);
-    *achieved_s = 1e-6 * us;
+    *achieved_s = us / 1e6; /* 56000 us are 0.056 s to the last digit */
     return WEFT_OK;
 }
 
