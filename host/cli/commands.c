@@ -9,6 +9,7 @@ extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_devices;
 extern const weft_command weft_cmd_import;
+extern const weft_command weft_cmd_rig;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_preview;
@@ -16,6 +17,7 @@ extern const weft_command weft_cmd_preview;
 /* In the order of the help: the way of the data, from the lights to the picture.  One a line. */
 /* clang-format off */
 const weft_command *const weft_commands[] = {
+    &weft_cmd_rig,
     &weft_cmd_devices,
     &weft_cmd_capture,
     &weft_cmd_calibrate_linearity,

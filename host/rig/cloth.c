@@ -79,14 +79,14 @@ static void spin_yarns(yarn_system *system, uint64_t seed)
         for (int i = 0; i < 9; i++)
             r[i] = weft_rig_random(seed, STREAM_YARN + (system->is_warp ? 0 : 16), (uint64_t)(9 * k + i));
         system->yarns[k] = (yarn){
-            .bulge = 0.93 + 0.14 * r[0],
-            .crimp = 0.93 + 0.14 * r[1],
-            .width = 1.0 + 0.06 * r[2],
-            .wobble_mm = {0.035 * system->pitch_mm * r[3], 0.02 * system->pitch_mm * r[4]},
+            .bulge = 0.90 + 0.20 * r[0],
+            .crimp = 0.88 + 0.24 * r[1],
+            .width = 0.93 + 0.09 * r[2],
+            .wobble_mm = {0.06 * system->pitch_mm * r[3], 0.04 * system->pitch_mm * r[4]},
             .wobble_phase = {TWO_PI * r[5], TWO_PI * r[6]},
             .slub_phase = TWO_PI * r[7],
             .ply_phase = TWO_PI * r[8],
-            .strength = 0.94 + 0.12 * r[2],
+            .strength = 0.985 + 0.03 * r[1],
         };
     }
 }
@@ -111,7 +111,7 @@ static double lens_section(double u, double half_width, double sagitta)
 {
     const double a = fabs(u);
     if (a >= 1)
-        return -2 * (a - 1) * half_width;
+        return -1.2 * (a - 1) * half_width;
     const double radius = (half_width * half_width + sagitta * sagitta) / (2 * sagitta);
     const double d = a * half_width;
     return sqrt(radius * radius - d * d) - (radius - sagitta);
@@ -127,7 +127,8 @@ static void place_yarn(const weft_weave *weave, yarn_system *system, int k)
         const int m = (int)floor(q);
         const double blend = 0.5 - 0.5 * cos(0.5 * TWO_PI * (q - m));
         const double before = on_top(weave, system, k, m), after = on_top(weave, system, k, m + 1);
-        const double slub = 1 + 0.04 * sin(3 * turn + y->slub_phase);
+        const double slub =
+            1 + 0.05 * sin(3 * turn + y->slub_phase) + 0.03 * sin(11 * turn + 2 * y->slub_phase);
         system->places[k * N + texel] = (yarn_place){
             .centre_mm =
                 (float)((k + 0.5) * system->pitch_mm + y->wobble_mm[0] * sin(2 * turn + y->wobble_phase[0]) +
@@ -192,7 +193,7 @@ static void weave_texel(const loom *l, int column, int row, weft_cloth_texel *te
         (float)(top->height + fade * (weave->ply_relief_mm * ply + 0.35 * weave->ply_relief_mm * hair));
     texel->dye = (uint8_t)(system->sett[top->k % (int)strlen(system->sett)] - '0');
     const double patchy = noise(l->seed, is_warp ? 2 : 3, x, y, 30, 30);
-    const double strength = spun->strength + 0.03 * hair + 0.02 * patchy;
+    const double strength = spun->strength + 0.03 * hair + 0.01 * patchy;
     texel->strength = to_byte((strength - 0.75) * 2);
     const double angle =
         (is_warp ? 0.25 * TWO_PI : 0) + (is_warp ? 1 : -1) * 0.4 * twist * (is_warp ? 1 : -1);
