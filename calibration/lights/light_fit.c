@@ -44,7 +44,7 @@ void fit_problem_fini(fit_problem *f)
     weft_free(f->weight);
 }
 
-static weft_err place_cells(fit_problem *f, const weft_camera *camera, const weft_sheet *sheet,
+static weft_err place_cells(fit_problem *f, const weft_camera *camera, const weft_white_sheet *sheet,
                             weft_error *err)
 {
     f->width = sheet->width;
@@ -54,7 +54,7 @@ static weft_err place_cells(fit_problem *f, const weft_camera *camera, const wef
     f->radius = hypot(fmax(f->cx, f->width - 1 - f->cx), fmax(f->cy, f->height - 1 - f->cy));
     for (int j = 0; j < sheet->rows; j++)
         for (int i = 0; i < sheet->columns; i++) {
-            const double u = weft_sheet_centre(sheet, i), v = weft_sheet_centre(sheet, j);
+            const double u = weft_white_sheet_centre(sheet, i), v = weft_white_sheet_centre(sheet, j);
             const int cell = j * sheet->columns + i;
             if (!weft_camera_to_plane(camera, u, v, 0, &f->x[cell]))
                 return weft_fail(
@@ -87,13 +87,13 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static weft_err check_brightness(const weft_sheet *sheet, weft_error *err)
+static weft_err check_brightness(const weft_white_sheet *sheet, weft_error *err)
 {
     double mean[WEFT_LIGHTS_MAX], sorted[WEFT_LIGHTS_MAX];
     const int n = sheet->columns * sheet->rows;
     for (int l = 0; l < sheet->n_lights; l++) {
         int there;
-        mean[l] = mean_value(weft_sheet_plane(sheet, l, 1), n, &there);
+        mean[l] = mean_value(weft_white_sheet_plane(sheet, l, 1), n, &there);
         if (there < (1 - LEFT_OUT_MOST) * n)
             return weft_fail(err, WEFT_ERR_NODATA,
                              "light %d: %.0f %% of the sheet's cells are missing or saturated", l,
@@ -112,11 +112,11 @@ static weft_err check_brightness(const weft_sheet *sheet, weft_error *err)
     return WEFT_OK;
 }
 
-static void take_values(fit_problem *f, const weft_sheet *sheet)
+static void take_values(fit_problem *f, const weft_white_sheet *sheet)
 {
     for (int l = 0; l < f->n_lights; l++)
         for (int c = 0; c < 3; c++) {
-            const float *const value = weft_sheet_plane(sheet, l, c);
+            const float *const value = weft_white_sheet_plane(sheet, l, c);
             float *const y = f->y + fit_plane(f, l, c), *const w = f->weight + fit_plane(f, l, c);
             int there;
             const double mean = mean_value(value, f->n_cells, &there);
@@ -152,10 +152,10 @@ static weft_err update_common(fit_problem *f, fit_planes *p, weft_error *err)
                 "sheet fill the frame?",
                 i % p->smooth.columns * (f->width - 1) / (p->smooth.columns - 1),
                 i / p->smooth.columns * (f->height - 1) / (p->smooth.rows - 1));
-    const weft_sheet *const sheet = p->smooth.sheet;
+    const weft_white_sheet *const sheet = p->smooth.sheet;
     for (int i = 0; i < f->n_cells; i++)
-        f->common[i] = fit_smooth_at(&p->smooth, p->nodes, weft_sheet_centre(sheet, i % sheet->columns),
-                                     weft_sheet_centre(sheet, i / sheet->columns));
+        f->common[i] = fit_smooth_at(&p->smooth, p->nodes, weft_white_sheet_centre(sheet, i % sheet->columns),
+                                     weft_white_sheet_centre(sheet, i / sheet->columns));
     return WEFT_OK;
 }
 
@@ -214,8 +214,9 @@ static void fill_light(const fit_problem *f, int light, weft_light *out)
                         .axis = weft_normalise(weft_sub(spot, p)),
                         .exponent = fmax(lamp->e, 0),
                         .intensity = {exp(lamp->log_phi[0]), exp(lamp->log_phi[1]), exp(lamp->log_phi[2])},
-                        .white_balance = {1, 1, 1},
                         .position_sigma_mm = f->position_sigma[light]};
+    for (int c = 0; c < 3; c++) /* the sheet is neutral */
+        out->white_balance[c] = out->intensity[1] / out->intensity[c];
 }
 
 static weft_err fill_result(const fit_problem *f, fit_planes *planes, weft_light *lights, float *gain,
@@ -237,20 +238,14 @@ static weft_err fill_result(const fit_problem *f, fit_planes *planes, weft_light
 
 static void put_result(weft_calibration *cal, int n_lights, const weft_light *lights, weft_light_grid grid)
 {
-    const bool keep_white = cal->has_lights && cal->n_lights == n_lights;
-    for (int l = 0; l < n_lights; l++) {
-        weft_light light = lights[l];
-        if (keep_white)
-            memcpy(light.white_balance, cal->lights[l].white_balance, sizeof light.white_balance);
-        cal->lights[l] = light;
-    }
+    memcpy(cal->lights, lights, (size_t)n_lights * sizeof *lights);
     weft_free(cal->grid.gain);
     cal->grid = grid;
     cal->n_lights = n_lights;
     cal->has_lights = true;
 }
 
-static weft_err check_inputs(const weft_camera *camera, const weft_sheet *sheet,
+static weft_err check_inputs(const weft_camera *camera, const weft_white_sheet *sheet,
                              const weft_light_fit_options *options, weft_error *err)
 {
     if (!camera->has_pose)
@@ -265,7 +260,7 @@ static weft_err check_inputs(const weft_camera *camera, const weft_sheet *sheet,
     return check_brightness(sheet, err);
 }
 
-weft_err weft_light_fit(const weft_camera *camera, const weft_sheet *sheet,
+weft_err weft_light_fit(const weft_camera *camera, const weft_white_sheet *sheet,
                         const weft_light_fit_options *options, weft_calibration *cal,
                         weft_light_fit_report *report, weft_error *err)
 {

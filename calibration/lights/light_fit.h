@@ -15,7 +15,7 @@
 #define WEFT_CALIBRATION_LIGHTS_LIGHT_FIT_H
 
 #include "calibration/calibration.h"
-#include "calibration/lights/sheet.h"
+#include "calibration/lights/white_sheet.h"
 
 #define WEFT_LIGHT_FIT_MAX_ROUNDS 10
 
@@ -52,12 +52,12 @@ typedef struct weft_light_fit_report {
  * Fits all lights and their grid.
  *
  * @param camera  with a pose; its size is that of the sheet
- * @param cal     gets lights (white_balance kept when it had as many) and grid; what it had is replaced;
- *                untouched on failure
+ * @param cal     gets lights (their white balance from the sheet, which is taken as neutral) and grid in
+ *                place of what it had; untouched on failure
  * @return WEFT_ERR_NODATA naming the light that is dark or absent, or the place where the sheet does not
  *         look like one; WEFT_ERR_MISMATCH, WEFT_ERR_RANGE, WEFT_ERR_NOMEM
  */
-weft_err weft_light_fit(const weft_camera *camera, const weft_sheet *sheet,
+weft_err weft_light_fit(const weft_camera *camera, const weft_white_sheet *sheet,
                         const weft_light_fit_options *options, weft_calibration *cal,
                         weft_light_fit_report *report, weft_error *err);
 

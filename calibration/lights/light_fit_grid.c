@@ -23,7 +23,7 @@ void fit_planes_fini(fit_planes *p)
     weft_free(p->nodes);
 }
 
-weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_sheet *sheet, weft_error *err)
+weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_white_sheet *sheet, weft_error *err)
 {
     const int columns = f->options->grid_columns, rows = f->options->grid_rows;
     *p = (fit_planes){0};
@@ -36,10 +36,10 @@ weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_sheet *
 
 static double deviation(const fit_planes *p, int cell)
 {
-    const weft_sheet *const sheet = p->smooth.sheet;
+    const weft_white_sheet *const sheet = p->smooth.sheet;
     return (double)p->residual[cell] - fit_smooth_at(&p->smooth, p->nodes,
-                                                     weft_sheet_centre(sheet, cell % sheet->columns),
-                                                     weft_sheet_centre(sheet, cell / sheet->columns));
+                                                     weft_white_sheet_centre(sheet, cell % sheet->columns),
+                                                     weft_white_sheet_centre(sheet, cell / sheet->columns));
 }
 
 static int compare_floats(const void *a, const void *b)
@@ -108,8 +108,8 @@ weft_err fit_grid(const fit_problem *f, fit_planes *p, int light, int channel, f
             err, WEFT_ERR_NODATA,
             "light %d: %.1f %% of the sheet is not smooth, first near pixel (%.0f, %.0f); does it fill "
             "the frame, without folds, print and dust?",
-            light, 100 * detail, weft_sheet_centre(p->smooth.sheet, first % p->smooth.sheet->columns),
-            weft_sheet_centre(p->smooth.sheet, first / p->smooth.sheet->columns));
+            light, 100 * detail, weft_white_sheet_centre(p->smooth.sheet, first % p->smooth.sheet->columns),
+            weft_white_sheet_centre(p->smooth.sheet, first / p->smooth.sheet->columns));
     *left_out = fmax(*left_out, detail);
     const int columns = p->smooth.columns, rows = p->smooth.rows;
     for (int j = 0; j < rows; j++)
@@ -126,7 +126,7 @@ weft_err fit_grid(const fit_problem *f, fit_planes *p, int light, int channel, f
 double fit_grid_residual(const fit_problem *f, const fit_planes *p, int light, const float *gain)
 {
     const int nodes = p->smooth.columns * p->smooth.rows;
-    const weft_sheet *const sheet = p->smooth.sheet;
+    const weft_white_sheet *const sheet = p->smooth.sheet;
     double sum = 0;
     long n = 0;
     for (int c = 0; c < 3; c++)
@@ -134,8 +134,8 @@ double fit_grid_residual(const fit_problem *f, const fit_planes *p, int light, c
             const double bare =
                 fit_residual(f, light, c, i) + fit_common_log(&f->shared, f->place[i]) + f->common[i];
             const double g = fit_smooth_at(&p->smooth, gain + (light * 3 + c) * nodes,
-                                           weft_sheet_centre(sheet, i % sheet->columns),
-                                           weft_sheet_centre(sheet, i / sheet->columns));
+                                           weft_white_sheet_centre(sheet, i % sheet->columns),
+                                           weft_white_sheet_centre(sheet, i / sheet->columns));
             const double r = exp(bare) / g - 1;
             if (isnan(r) || fabs(r) > DETAIL)
                 continue;

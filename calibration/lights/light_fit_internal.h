@@ -76,13 +76,14 @@ weft_err fit_start(fit_problem *f, weft_error *err);
 
 /** A plane over the cells, smoothed to nodes at the frame's corners and between. */
 typedef struct fit_smooth {
-    const weft_sheet *sheet;
+    const weft_white_sheet *sheet;
     int columns, rows; /* of nodes */
     double sigma_px;   /* of the Gaussian window */
     double *row_sums;  /* scratch: [5][sheet rows][columns] */
 } fit_smooth;
 
-weft_err fit_smooth_init(fit_smooth *s, const weft_sheet *sheet, int columns, int rows, weft_error *err);
+weft_err fit_smooth_init(fit_smooth *s, const weft_white_sheet *sheet, int columns, int rows,
+                         weft_error *err);
 void fit_smooth_fini(fit_smooth *s);
 
 /**
@@ -108,7 +109,7 @@ typedef struct fit_planes {
     float *nodes;    /* [grid rows][grid columns] */
 } fit_planes;
 
-weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_sheet *sheet, weft_error *err);
+weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_white_sheet *sheet, weft_error *err);
 void fit_planes_fini(fit_planes *p);
 
 /**

@@ -9,7 +9,7 @@
 
 enum { SUM_W, SUM_WX, SUM_WXX, SUM_WL, SUM_WLX, N_SUMS };
 
-weft_err fit_smooth_init(fit_smooth *s, const weft_sheet *sheet, int columns, int rows, weft_error *err)
+weft_err fit_smooth_init(fit_smooth *s, const weft_white_sheet *sheet, int columns, int rows, weft_error *err)
 {
     *s = (fit_smooth){
         .sheet = sheet, .columns = columns, .rows = rows, .sigma_px = WINDOW_SHARE * sheet->width};
@@ -53,7 +53,7 @@ static void sum_rows(const fit_smooth *s, const float *values, const float *weig
                 const double value = (double)values[j * nc + k];
                 if (isnan(value))
                     continue;
-                const double dx = (weft_sheet_centre(s->sheet, k) - at) / s->sigma_px;
+                const double dx = (weft_white_sheet_centre(s->sheet, k) - at) / s->sigma_px;
                 const double w = exp(-0.5 * dx * dx) * (weights ? (double)weights[j * nc + k] : 1);
                 sum[SUM_W] += w;
                 sum[SUM_WX] += w * dx;
@@ -77,7 +77,7 @@ static double solve_node(const fit_smooth *s, int i, int j)
     int last;
     for (int k = window(s, at, s->sheet->rows, &last); k <= last; k++) {
         const double *const q = s->row_sums + (size_t)(k * s->columns + i);
-        const double dy = (weft_sheet_centre(s->sheet, k) - at) / s->sigma_px, g = exp(-0.5 * dy * dy);
+        const double dy = (weft_white_sheet_centre(s->sheet, k) - at) / s->sigma_px, g = exp(-0.5 * dy * dy);
         const double w = g * q[0], wx = g * q[SUM_WX * plane], wl = g * q[SUM_WL * plane];
         m.m[0] += w;
         m.m[1] += wx;

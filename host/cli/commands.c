@@ -5,6 +5,8 @@ extern const weft_command weft_cmd_calibrate_colour;
 extern const weft_command weft_cmd_calibrate_linearity;
 extern const weft_command weft_cmd_calibrate_white;
 extern const weft_command weft_cmd_capture;
+extern const weft_command weft_cmd_calibrate_lens;
+extern const weft_command weft_cmd_calibrate_lights;
 extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_devices;
@@ -20,8 +22,10 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_rig,
     &weft_cmd_devices,
     &weft_cmd_capture,
+    &weft_cmd_calibrate_lens,
     &weft_cmd_calibrate_linearity,
     &weft_cmd_calibrate_white,
+    &weft_cmd_calibrate_lights,
     &weft_cmd_calibrate_colour,
     &weft_cmd_import,
     &weft_cmd_solve,

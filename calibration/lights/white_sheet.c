@@ -1,4 +1,4 @@
-#include "calibration/lights/sheet.h"
+#include "calibration/lights/white_sheet.h"
 
 #include "core/mem.h"
 
@@ -7,9 +7,9 @@
 
 #define CELLS_ACROSS 80
 
-weft_err weft_sheet_init(weft_sheet *sheet, int width, int height, int n_lights, weft_error *err)
+weft_err weft_white_sheet_init(weft_white_sheet *sheet, int width, int height, int n_lights, weft_error *err)
 {
-    weft_sheet s = {.width = width, .height = height, .n_lights = n_lights};
+    weft_white_sheet s = {.width = width, .height = height, .n_lights = n_lights};
     assert(n_lights >= 1 && n_lights <= WEFT_LIGHTS_MAX);
     s.cell_px = width > 4 * CELLS_ACROSS ? (width + CELLS_ACROSS) / (2 * CELLS_ACROSS) * 2 : 2;
     s.columns = width / s.cell_px; /* a rest at the right and bottom edge is not used */
@@ -27,14 +27,14 @@ weft_err weft_sheet_init(weft_sheet *sheet, int width, int height, int n_lights,
     return WEFT_OK;
 }
 
-void weft_sheet_fini(weft_sheet *sheet)
+void weft_white_sheet_fini(weft_white_sheet *sheet)
 {
     weft_free(sheet->value);
-    *sheet = (weft_sheet){0};
+    *sheet = (weft_white_sheet){0};
 }
 
 /* Means of one cell; false when a pixel of it is clipped. */
-static bool average_cell(const weft_sheet *sheet, int i, int j, const weft_image *image, weft_cfa cfa,
+static bool average_cell(const weft_white_sheet *sheet, int i, int j, const weft_image *image, weft_cfa cfa,
                          const weft_mask *clipped, double mean[3])
 {
     double sum[3] = {0};
@@ -55,13 +55,14 @@ static bool average_cell(const weft_sheet *sheet, int i, int j, const weft_image
     return true;
 }
 
-static weft_err check_clipped(const weft_sheet *sheet, int light, const weft_mask *clipped, weft_error *err)
+static weft_err check_clipped(const weft_white_sheet *sheet, int light, const weft_mask *clipped,
+                              weft_error *err)
 {
     const size_t total = (size_t)sheet->width * (size_t)sheet->height;
     size_t n = 0;
     for (size_t i = 0; i < total; i++)
         n += clipped->data[i] != 0;
-    if ((double)n > WEFT_SHEET_CLIPPED_MOST * (double)total)
+    if ((double)n > WEFT_WHITE_SHEET_CLIPPED_MOST * (double)total)
         return weft_fail(
             err, WEFT_ERR_RANGE,
             "light %d: %.1f %% of the white sheet is saturated; take it again with a shorter exposure", light,
@@ -69,8 +70,8 @@ static weft_err check_clipped(const weft_sheet *sheet, int light, const weft_mas
     return WEFT_OK;
 }
 
-weft_err weft_sheet_add(weft_sheet *sheet, int light, const weft_image *image, weft_cfa cfa,
-                        const weft_mask *clipped, weft_error *err)
+weft_err weft_white_sheet_add(weft_white_sheet *sheet, int light, const weft_image *image, weft_cfa cfa,
+                              const weft_mask *clipped, weft_error *err)
 {
     assert(light >= 0 && light < sheet->n_lights && (image->planes == 1 || image->planes == 3));
     assert(cfa == WEFT_CFA_NONE || image->planes == 1);
@@ -88,7 +89,7 @@ weft_err weft_sheet_add(weft_sheet *sheet, int light, const weft_image *image, w
                 return weft_fail(err, WEFT_ERR_RANGE, "light %d: its frame has no number near pixel (%d, %d)",
                                  light, i * sheet->cell_px, j * sheet->cell_px);
             for (int c = 0; c < 3; c++)
-                weft_sheet_plane(sheet, light, c)[j * sheet->columns + i] = (float)mean[c];
+                weft_white_sheet_plane(sheet, light, c)[j * sheet->columns + i] = (float)mean[c];
         }
     return WEFT_OK;
 }

@@ -1,0 +1,264 @@
+/* weft calibrate lights: where the lights are and what they do, from a white sheet. */
+#include "host/cli/command.h"
+
+#include "calibration/calibration_report.h"
+#include "calibration/lights/light_fit.h"
+#include "core/csv.h"
+#include "core/file.h"
+#include "core/json.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "host/set/plate.h"
+
+#include <string.h>
+
+typedef struct lights_args {
+    const char *output, *guess;
+    double reflectance;
+    weft_size grid;
+} lights_args;
+
+static const weft_field fields[] = {
+    {.key = "output",
+     .short_opt = 'o',
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lights_args, output),
+     .unit = "CAL",
+     .required = true,
+     .help = "calibration to add to; it must have the camera and its pose"},
+    {.key = "guess",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lights_args, guess),
+     .unit = "FILE",
+     .help =
+         "rough positions: CSV with x_mm,y_mm,z_mm a light, or a calibration; else they are searched for"},
+    {.key = "reflectance",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(lights_args, reflectance),
+     .unit = "part",
+     .min = 0.05,
+     .max = 1,
+     .def = "0.99",
+     .help = "diffuse reflectance of the sheet"},
+    {.key = "grid",
+     .type = WEFT_FIELD_SIZE,
+     .offset = offsetof(lights_args, grid),
+     .unit = "CxR",
+     .def = "33x22",
+     .help = "nodes of the grid of gains"},
+    {0},
+};
+
+static weft_err guess_from_calibration(const char *path, weft_light_fit_options *options, weft_error *err)
+{
+    weft_calibration cal;
+    WEFT_TRY(weft_calibration_load(path, &cal, err));
+    weft_err status = weft_calibration_require(&cal, WEFT_CALIBRATION_LIGHTS, path, err);
+    options->n_guess = cal.n_lights;
+    for (int l = 0; l < cal.n_lights && status == WEFT_OK; l++) {
+        options->guess[l] = cal.lights[l].position;
+        if (cal.lights[l].distant)
+            status = weft_fail(err, WEFT_ERR_MISMATCH, "%s: light %d is a distant one, it has no position",
+                               path, l);
+    }
+    weft_calibration_fini(&cal);
+    return status;
+}
+
+static weft_err guess_from_csv(const char *path, weft_light_fit_options *options, weft_error *err)
+{
+    static const char *const names[] = {"x_mm", "y_mm", "z_mm"};
+    weft_csv csv;
+    WEFT_TRY(weft_csv_read(path, &csv, err));
+    weft_err status = WEFT_OK;
+    if (csv.rows < 1 || csv.rows > WEFT_LIGHTS_MAX)
+        status = weft_fail(err, WEFT_ERR_RANGE, "%s: has %d rows, wanted one a light", path, csv.rows);
+    for (int l = 0; l < csv.rows && status == WEFT_OK; l++) {
+        double p[3];
+        for (int k = 0; k < 3 && status == WEFT_OK; k++) {
+            const int column = weft_csv_column(&csv, names[k]);
+            status = column < 0 ? weft_fail(err, WEFT_ERR_FORMAT, "%s: has no column \"%s\"", path, names[k])
+                                : weft_csv_number(&csv, l, column, path, &p[k], err);
+        }
+        if (status == WEFT_OK)
+            options->guess[l] = (weft_vec3){p[0], p[1], p[2]};
+    }
+    options->n_guess = csv.rows;
+    weft_csv_fini(&csv);
+    return status;
+}
+
+static weft_err make_options(const lights_args *args, weft_light_fit_options *options, weft_error *err)
+{
+    *options = weft_light_fit_defaults;
+    options->reflectance = args->reflectance;
+    options->grid_columns = args->grid.width;
+    options->grid_rows = args->grid.height;
+    if (options->grid_columns < 4 || options->grid_rows < 4 || options->grid_columns > 512 ||
+        options->grid_rows > 512)
+        return weft_fail(err, WEFT_ERR_USAGE, "--grid %dx%d: wanted 4 to 512 nodes each way",
+                         args->grid.width, args->grid.height);
+    if (!args->guess)
+        return WEFT_OK;
+    return weft_folder_exists(args->guess) ? guess_from_calibration(args->guess, options, err)
+                                           : guess_from_csv(args->guess, options, err);
+}
+
+static weft_err add_light(const weft_set *set, int light, const weft_plate *ambient, weft_white_sheet *sheet,
+                          weft_error *err)
+{
+    weft_plate plate;
+    WEFT_TRY(weft_plate_load_light(set, light, ambient, &plate, err));
+    const weft_err status = weft_white_sheet_add(sheet, light, &plate.image, plate.cfa, &plate.clipped, err);
+    weft_plate_fini(&plate);
+    return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", set->folder);
+}
+
+static weft_err load_sheet(const weft_set *set, weft_white_sheet *sheet, weft_error *err)
+{
+    weft_plate ambient = {0};
+    bool has_ambient = false;
+    weft_progress progress = {0};
+    const int n = weft_set_n_lights(set);
+    WEFT_TRY(weft_white_sheet_init(sheet, set->width, set->height, n, err));
+    weft_err status = weft_plate_load_ambient(set, &ambient, &has_ambient, err);
+    if (status == WEFT_OK) {
+        if (!has_ambient)
+            weft_warn("%s: has no ambient frame; light of the room is taken for the lamps'", set->folder);
+        weft_progress_begin(&progress, "reading the white sheet", "lights", n);
+    }
+    for (int light = 0; light < n && status == WEFT_OK; light++) {
+        status = add_light(set, light, has_ambient ? &ambient : NULL, sheet, err);
+        if (status == WEFT_OK)
+            status = weft_progress_step(&progress, 1, err);
+    }
+    weft_progress_end(&progress);
+    weft_plate_fini(&ambient);
+    if (status != WEFT_OK)
+        weft_white_sheet_fini(sheet);
+    return status;
+}
+
+static json_t *report_json(const weft_set *set, const lights_args *args, const weft_calibration *cal,
+                           const weft_light_fit_report *r)
+{
+    json_t *const rounds = json_array(), *const lights = json_array();
+    for (int i = 0; i < r->n_rounds; i++)
+        json_array_append_new(
+            rounds, json_pack("{s:f, s:f}", "moved_mm", r->rounds[i].moved_mm, "rms", r->rounds[i].rms));
+    for (int l = 0; l < cal->n_lights; l++)
+        json_array_append_new(lights, json_pack("{s:f, s:f, s:f, s:f}", "position_sigma_mm",
+                                                cal->lights[l].position_sigma_mm, "residual",
+                                                cal->lights[l].residual, "residual_without_grid",
+                                                r->model_rms[l], "left_out", r->left_out[l]));
+    json_t *const report = json_pack(
+        "{s:s, s:f, s:b, s:o, s:f, s:o, s:o, s:o}", "set", set->folder, "reflectance", args->reflectance,
+        "settled", (int)r->settled, "rounds", rounds, "mean_exponent", r->exponent, "vignetting",
+        weft_json_numbers(r->vignetting, 3), "slope", weft_json_numbers(r->slope, 2), "lights", lights);
+    if (report && args->guess)
+        json_object_set_new(report, "guess", json_string(args->guess));
+    return report;
+}
+
+static weft_err print_result(const weft_invocation *inv, const lights_args *args, const weft_calibration *cal,
+                             const weft_light_fit_report *r, weft_error *err)
+{
+    if (inv->json)
+        return weft_print_json(inv,
+                               json_pack("{s:s, s:i, s:O}", "calibration", args->output, "n_lights",
+                                         cal->n_lights, "lights", weft_calibration_get_report(cal, "lights")),
+                               err);
+    fprintf(
+        inv->out,
+        "light      x        y        z  +- mm  exponent  intensity R, G, B       off by  without grid\n");
+    for (int l = 0; l < cal->n_lights; l++) {
+        const weft_light *const t = &cal->lights[l];
+        fprintf(inv->out, "%5d %8.2f %8.2f %8.2f  %5.2f  %8.3f  %6.4f %6.4f %6.4f  %6.3f %%  %10.3f %%\n", l,
+                t->position.x, t->position.y, t->position.z, t->position_sigma_mm, t->exponent,
+                t->intensity[0], t->intensity[1], t->intensity[2], 100 * t->residual, 100 * r->model_rms[l]);
+    }
+    fprintf(inv->out, "%s after %d rounds, last move %.3f mm\n", r->settled ? "settled" : "not settled",
+            r->n_rounds, r->rounds[r->n_rounds - 1].moved_mm);
+    return WEFT_OK;
+}
+
+/* A white balance that was measured on a chart is not replaced by the sheet's. */
+static void keep_measured_white(const weft_calibration *former, weft_calibration *cal)
+{
+    if (!weft_calibration_get_report(cal, "white") || former->n_lights != cal->n_lights)
+        return;
+    for (int l = 0; l < cal->n_lights; l++)
+        memcpy(cal->lights[l].white_balance, former->lights[l].white_balance,
+               sizeof cal->lights[l].white_balance);
+}
+
+static weft_err fit(const weft_invocation *inv, const lights_args *args, const weft_set *set,
+                    weft_calibration *cal, weft_error *err)
+{
+    weft_light_fit_options options;
+    weft_light_fit_report report;
+    weft_white_sheet sheet;
+    WEFT_TRY(make_options(args, &options, err));
+    WEFT_TRY(load_sheet(set, &sheet, err));
+    const weft_calibration former = *cal; /* its numbers; what it points to is not used */
+    weft_err status = weft_light_fit(&cal->camera, &sheet, &options, cal, &report, err);
+    weft_white_sheet_fini(&sheet);
+    if (status != WEFT_OK)
+        return weft_prefix(err, status, "%s", set->folder);
+    keep_measured_white(&former, cal);
+    for (int i = 0; i < report.n_rounds; i++)
+        weft_explain("round %d: moved by %.4f mm at most, measured/model differs by %.3f %% rms", i + 1,
+                     report.rounds[i].moved_mm, 100 * report.rounds[i].rms);
+    if (!report.settled)
+        weft_warn("the lights still moved by %.2f mm in the last round; the sheet may be uneven",
+                  report.rounds[report.n_rounds - 1].moved_mm);
+    WEFT_TRY(weft_calibration_set_report(cal, "lights", report_json(set, args, cal, &report), err));
+    WEFT_TRY(weft_calibration_save(args->output, cal, err));
+    return print_result(inv, args, cal, &report, err);
+}
+
+static weft_err check(const weft_invocation *inv, const lights_args *args, const weft_set *set,
+                      const weft_calibration *cal, weft_error *err)
+{
+    WEFT_TRY(
+        weft_calibration_require(cal, WEFT_CALIBRATION_CAMERA | WEFT_CALIBRATION_POSE, args->output, err));
+    if (cal->has_lights && !inv->force)
+        return weft_fail(err, WEFT_ERR_EXISTS, "%s: has lights already; --force replaces them", args->output);
+    WEFT_TRY(weft_set_require_lights(set, err));
+    return weft_calibration_require_size(cal, set->width, set->height, args->output, err);
+}
+
+static weft_err run_lights(const weft_invocation *inv, const void *vargs, weft_error *err)
+{
+    const lights_args *const args = vargs;
+    weft_calibration cal;
+    weft_set set;
+    WEFT_TRY(weft_calibration_open(args->output, &cal, err));
+    weft_err status = weft_set_load(inv->operands[0], &set, err);
+    if (status == WEFT_OK) {
+        status = check(inv, args, &set, &cal, err);
+        if (status == WEFT_OK)
+            status = fit(inv, args, &set, &cal, err);
+        weft_set_fini(&set);
+    }
+    weft_calibration_fini(&cal);
+    return status;
+}
+
+const weft_command weft_cmd_calibrate_lights = {
+    .name = "calibrate lights",
+    .summary = "a white sheet: position, intensity and fall-off of each light",
+    .operands = "SET",
+    .min_operands = 1,
+    .max_operands = 1,
+    .args_size = sizeof(lights_args),
+    .fields = fields,
+    .details =
+        "SET shows a flat matte white sheet that fills the frame, once under every light, nothing "
+        "saturated.\n"
+        "All lights are fitted together with the camera's vignetting, to convergence; what a light's model "
+        "still\n"
+        "misses goes into a smooth grid of gains beside calibration.json.  docs/calibration.md explains.",
+    .example = "weft calibrate lights white.set -o scanner.cal",
+    .run = run_lights,
+};
