@@ -1,6 +1,7 @@
 #include "core/formats/raw_file.h"
 
 #include "core/file.h"
+#include "core/formats/tiff_extent.h"
 
 #include <libraw.h>
 #include <math.h>
@@ -199,6 +200,7 @@ weft_err weft_raw_read(const char *path, weft_mosaic *mosaic, weft_frame_info *i
     uint64_t size;
     bool damaged = false;
     WEFT_TRY(weft_file_size(path, &size, err));
+    WEFT_TRY(weft_dng_check_extent(path, err));
     libraw_data_t *const raw = libraw_init(0);
     if (!raw)
         return weft_fail(err, WEFT_ERR_NOMEM, "%s: no memory for LibRaw", path);

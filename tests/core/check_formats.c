@@ -15,6 +15,7 @@
 #include <math.h>
 #include <openexr.h>
 #include <string.h>
+#include <tiffio.h>
 
 static weft_image make_image(int width, int height, int planes)
 {
@@ -260,6 +261,78 @@ static void test_tiff_round_trip(void **state)
     check_raster_round_trip("a.tif", weft_tiff_write, weft_tiff_read);
 }
 
+/* Tiles, planes apart, the other byte order, LZW, white as zero: what others' TIFFs may be. */
+static void write_foreign_tiff(const char *path, const weft_raster *raster, bool tiled, bool planes_apart,
+                               bool big_endian, bool inverted)
+{
+    TIFF *const tiff = TIFFOpen(path, big_endian ? "wb" : "wl");
+    assert_non_null(tiff);
+    const int channels = raster->channels, per_block = planes_apart ? 1 : channels;
+    const int bw = tiled ? 32 : raster->width, bh = tiled ? 16 : 5;
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, raster->width);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, raster->height);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, raster->bits);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, channels);
+    TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, planes_apart ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC,
+                 inverted        ? PHOTOMETRIC_MINISWHITE
+                 : channels == 3 ? PHOTOMETRIC_RGB
+                                 : PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_LZW);
+    if (tiled) {
+        TIFFSetField(tiff, TIFFTAG_TILEWIDTH, bw);
+        TIFFSetField(tiff, TIFFTAG_TILELENGTH, bh);
+    } else
+        TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, bh);
+    uint16_t block[512 * 16 * 3];
+    const int top = (1 << raster->bits) - 1;
+    for (int s = 0; s < channels; s += per_block)
+        for (int y0 = 0; y0 < raster->height; y0 += bh)
+            for (int x0 = 0; x0 < raster->width; x0 += bw) {
+                const int rows = tiled || raster->height - y0 > bh ? bh : raster->height - y0;
+                for (int i = 0; i < rows * bw * per_block; i++) {
+                    const int x = x0 + i / per_block % bw, y = y0 + i / per_block / bw, c = s + i % per_block;
+                    int value = 0;
+                    if (x < raster->width && y < raster->height)
+                        value =
+                            raster->data[((size_t)y * (size_t)raster->width + (size_t)x) * (size_t)channels +
+                                         (size_t)c];
+                    value = inverted ? top - value : value;
+                    if (raster->bits == 8)
+                        ((uint8_t *)block)[i] = (uint8_t)value;
+                    else
+                        block[i] = (uint16_t)value;
+                }
+                const tmsize_t bytes = (tmsize_t)rows * bw * per_block * raster->bits / 8;
+                if (tiled)
+                    TIFFWriteEncodedTile(tiff,
+                                         TIFFComputeTile(tiff, (uint32_t)x0, (uint32_t)y0, 0, (uint16_t)s),
+                                         block, bytes);
+                else
+                    TIFFWriteEncodedStrip(tiff, TIFFComputeStrip(tiff, (uint32_t)y0, (uint16_t)s), block,
+                                          bytes);
+            }
+    TIFFClose(tiff);
+}
+
+static void test_tiff_of_other_programs(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 64; k++) {
+        const bool tiled = k & 1, apart = k & 2, big_endian = k & 4, inverted = k & 8;
+        const int bits = k & 16 ? 16 : 8, channels = k & 32 ? 3 : 1;
+        if (inverted && channels == 3)
+            continue;
+        weft_raster raster = make_raster(75, 43, channels, bits), back;
+        write_foreign_tiff(weft_test_path("foreign.tif"), &raster, tiled, apart, big_endian, inverted);
+        assert_ok(weft_tiff_read(weft_test_path("foreign.tif"), &back, err));
+        assert_true(back.width == 75 && back.height == 43 && back.channels == channels && back.bits == bits);
+        assert_memory_equal(back.data, raster.data, (size_t)75 * 43 * (size_t)channels * sizeof *raster.data);
+        weft_raster_fini(&raster);
+        weft_raster_fini(&back);
+    }
+}
+
 /* A 1-bit interlaced palette PNG of 3 x 2 pixels, made byte by byte from the PNG specification with
  * Python's zlib: green on red. */
 static void test_png_palette_is_expanded(void **state)
@@ -355,6 +428,7 @@ int main(void)
         cmocka_unit_test(test_exr_is_the_same_with_any_threads),
         cmocka_unit_test(test_png_round_trip),
         cmocka_unit_test(test_tiff_round_trip),
+        cmocka_unit_test(test_tiff_of_other_programs),
         cmocka_unit_test(test_png_palette_is_expanded),
         cmocka_unit_test(test_masks),
         cmocka_unit_test(test_pictures_by_name),

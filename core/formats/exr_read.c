@@ -1,65 +1,25 @@
-#include "core/formats/exr_file.h"
-
 #include "core/file.h"
-#include "core/formats/half.h"
+#include "core/formats/exr_file.h"
+#include "core/formats/exr_words.h"
 #include "core/mem.h"
 #include "core/parallel.h"
 
-#include <openexr.h>
-#include <stdatomic.h>
-#include <stdio.h>
 #include <string.h>
 
-#define CHUNKS_AT_ONCE 16 /* chunks compressed side by side before they are written in order */
-
-/* The first sentence that the library says; chunks are done on several threads. */
-typedef struct exr_report {
-    atomic_flag taken;
-    char text[256];
-} exr_report;
-
-static void on_error(exr_const_context_t context, exr_result_t code, const char *text)
+static weft_err damaged(weft_error *err, const char *path, weft_exr_failure *failure, exr_result_t code)
 {
-    void *user = NULL;
-    (void)code;
-    exr_get_user_data(context, &user);
-    exr_report *const report = user;
-    if (report && !atomic_flag_test_and_set(&report->taken))
-        snprintf(report->text, sizeof report->text, "%s", text);
-}
-
-static exr_context_initializer_t make_initializer(exr_report *report)
-{
-    exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    *report = (exr_report){.taken = ATOMIC_FLAG_INIT};
-    init.error_handler_fn = on_error;
-    init.user_data = report;
-    init.max_image_width = init.max_image_height = WEFT_IMAGE_MAX_SIDE;
-    init.max_tile_width = init.max_tile_height = WEFT_IMAGE_MAX_SIDE;
-    init.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION; /* a cut file is an error */
-    return init;
-}
-
-/* The library's words for a failure, or its general ones for the code. */
-static const char *words(const exr_report *report, exr_result_t code)
-{
-    return report->text[0] ? report->text : exr_get_default_error_message(code);
-}
-
-static weft_err damaged(weft_error *err, const char *path, const exr_report *report, exr_result_t code)
-{
-    if (code == EXR_ERR_OUT_OF_MEMORY)
+    weft_exr_note(failure, code);
+    if (failure->code == EXR_ERR_OUT_OF_MEMORY)
         return weft_fail(err, WEFT_ERR_NOMEM, "%s: no memory to read it", path);
-    return weft_fail(err, WEFT_ERR_FORMAT, "%s: is a damaged or unknown EXR: %s", path, words(report, code));
+    return weft_fail(err, WEFT_ERR_FORMAT, "%s: is a damaged or unknown EXR: %s", path,
+                     weft_exr_words(failure));
 }
-
-/* ---- reading ---- */
 
 typedef struct exr_reader {
     const char *path;
     uint64_t size; /* of the file, bytes */
     exr_context_t context;
-    exr_report report;
+    weft_exr_failure failure;
     int part;
     exr_storage_t storage;
     exr_attr_box2i_t window;
@@ -70,18 +30,15 @@ typedef struct exr_reader {
     int n_planes;
     const char **channel_of; /* [n_planes] the file's channel that fills the plane */
     weft_image image;
-    atomic_int failed; /* first exr_result_t that is not success */
 } exr_reader;
 
 static weft_err open_reader(exr_reader *r, const char *path, weft_error *err)
 {
     r->path = path;
     WEFT_TRY(weft_file_size(path, &r->size, err));
-    const exr_context_initializer_t init = make_initializer(&r->report);
+    const exr_context_initializer_t init = weft_exr_initializer();
     const exr_result_t code = exr_start_read(&r->context, path, &init);
-    if (code == EXR_ERR_FILE_ACCESS)
-        return weft_fail(err, WEFT_ERR_IO, "%s: cannot be opened: %s", path, words(&r->report, code));
-    return code == EXR_ERR_SUCCESS ? WEFT_OK : damaged(err, path, &r->report, code);
+    return code == EXR_ERR_SUCCESS ? WEFT_OK : damaged(err, path, &r->failure, code);
 }
 
 static void close_reader(exr_reader *r)
@@ -165,7 +122,7 @@ static weft_err read_layout(exr_reader *r, weft_error *err)
     if (code == EXR_ERR_SUCCESS)
         code = exr_get_data_window(r->context, r->part, &r->window);
     if (code != EXR_ERR_SUCCESS)
-        return damaged(err, r->path, &r->report, code);
+        return damaged(err, r->path, &r->failure, code);
     if (r->storage != EXR_STORAGE_SCANLINE && r->storage != EXR_STORAGE_TILED)
         return weft_fail(err, WEFT_ERR_FORMAT, "%s: holds deep samples, wanted a flat image", r->path);
     const int64_t width = (int64_t)r->window.max.x - r->window.min.x + 1;
@@ -180,7 +137,7 @@ static weft_err read_layout(exr_reader *r, weft_error *err)
     else
         code = exr_get_tile_sizes(r->context, r->part, 0, 0, &r->tile_width, &r->tile_height);
     if (code != EXR_ERR_SUCCESS || r->tile_width < 1 || r->tile_height < 1)
-        return damaged(err, r->path, &r->report, code);
+        return damaged(err, r->path, &r->failure, code);
     r->n_across = (r->width + r->tile_width - 1) / r->tile_width;
     const int n_down = (r->height + r->tile_height - 1) / r->tile_height;
     if (__builtin_mul_overflow(r->n_across, n_down, &r->n_chunks))
@@ -204,7 +161,7 @@ static weft_err find_chunks(exr_reader *r, weft_error *err)
                                                &r->chunks[i])
                 : exr_read_tile_chunk_info(r->context, r->part, across, down, 0, 0, &r->chunks[i]);
         if (code != EXR_ERR_SUCCESS)
-            return damaged(err, r->path, &r->report, code);
+            return damaged(err, r->path, &r->failure, code);
         const int w = r->width - across * r->tile_width, h = r->height - down * r->tile_height;
         if (r->chunks[i].width > w || r->chunks[i].height > h || r->chunks[i].width < 1 ||
             r->chunks[i].height < 1)
@@ -243,7 +200,7 @@ static void decode_chunk(void *context, int band, int row_begin, int row_end)
 {
     exr_reader *const r = context;
     (void)row_begin, (void)row_end;
-    if (atomic_load(&r->failed) != EXR_ERR_SUCCESS)
+    if (atomic_load(&r->failure.code) != EXR_ERR_SUCCESS)
         return;
     exr_decode_pipeline_t pipe = EXR_DECODE_PIPELINE_INITIALIZER;
     const exr_chunk_info_t *const chunk = &r->chunks[band];
@@ -258,9 +215,7 @@ static void decode_chunk(void *context, int band, int row_begin, int row_end)
         code = exr_decoding_run(r->context, r->part, &pipe);
     exr_decoding_destroy(r->context, &pipe);
     weft_free(spare);
-    int success = EXR_ERR_SUCCESS;
-    if (code != EXR_ERR_SUCCESS)
-        atomic_compare_exchange_strong(&r->failed, &success, code);
+    weft_exr_note(&r->failure, code);
 }
 
 static void copy_repeated_planes(exr_reader *r)
@@ -291,8 +246,8 @@ weft_err weft_exr_read(const char *path, const char *const *names, int n, weft_i
     if (status != WEFT_OK)
         goto out;
     weft_parallel_rows(r.n_chunks * WEFT_BAND_ROWS, decode_chunk, &r);
-    if (r.failed != EXR_ERR_SUCCESS) {
-        status = damaged(err, path, &r.report, r.failed);
+    if (r.failure.code != EXR_ERR_SUCCESS) {
+        status = damaged(err, path, &r.failure, r.failure.code);
         goto out;
     }
     copy_repeated_planes(&r);
@@ -312,179 +267,12 @@ weft_err weft_exr_channels(const char *path, char **names, weft_error *err)
         const exr_result_t code = exr_get_channels(r.context, 0, &list);
         char *const text = code == EXR_ERR_SUCCESS ? list_channels(list, err) : NULL;
         if (code != EXR_ERR_SUCCESS)
-            status = damaged(err, path, &r.report, code);
+            status = damaged(err, path, &r.failure, code);
         else if (!text)
             status = WEFT_ERR_NOMEM;
         else
             *names = text;
     }
     close_reader(&r);
-    return status;
-}
-
-/* ---- writing ---- */
-
-typedef struct exr_writer {
-    const weft_image *image;
-    const char *const *names;
-    weft_exr_type type;
-    exr_context_t context;
-    exr_report report;
-    int part, lines, n_chunks, first_chunk;
-    exr_encode_pipeline_t pipes[CHUNKS_AT_ONCE];
-    bool started[CHUNKS_AT_ONCE];
-    uint16_t *halves; /* [CHUNKS_AT_ONCE][planes][lines][width] for WEFT_EXR_HALF, else NULL */
-    atomic_int failed;
-} exr_writer;
-
-static weft_err check_names(const char *path, const weft_image *image, const char *const *names,
-                            weft_error *err)
-{
-    for (int p = 0; p < image->planes; p++) {
-        const size_t n = strlen(names[p]);
-        if (n < 1 || n > 255)
-            return weft_fail(err, WEFT_ERR_RANGE, "%s: a channel name has 1 to 255 letters, not %zu", path,
-                             n);
-        for (int q = 0; q < p; q++)
-            if (strcmp(names[p], names[q]) == 0)
-                return weft_fail(err, WEFT_ERR_RANGE, "%s: the channel name %s is given twice", path,
-                                 names[p]);
-    }
-    return WEFT_OK;
-}
-
-static exr_result_t write_header(exr_writer *w)
-{
-    const exr_pixel_type_t type = w->type == WEFT_EXR_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT;
-    exr_set_longname_support(w->context, 1);
-    exr_result_t code = exr_add_part(w->context, NULL, EXR_STORAGE_SCANLINE, &w->part);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_initialize_required_attr_simple(w->context, w->part, w->image->width, w->image->height,
-                                                   EXR_COMPRESSION_ZIP);
-    for (int p = 0; p < w->image->planes && code == EXR_ERR_SUCCESS; p++)
-        code = exr_add_channel(w->context, w->part, w->names[p], type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_set_zip_compression_level(w->context, w->part, 4); /* OpenEXR's default since 3.1.3 */
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_write_header(w->context);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_get_scanlines_per_chunk(w->context, w->part, &w->lines);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_get_chunk_count(w->context, w->part, &w->n_chunks);
-    return code;
-}
-
-/* Gives each channel of the pipeline its lines: the image's own floats, or their halves in `slot`. */
-static void aim_source(exr_writer *w, exr_encode_pipeline_t *pipe, int slot, int y)
-{
-    const size_t width = (size_t)w->image->width;
-    const size_t n = width * (size_t)pipe->chunk.height;
-    for (int c = 0; c < pipe->channel_count; c++) {
-        exr_coding_channel_info_t *const channel = &pipe->channels[c];
-        int p = 0;
-        while (strcmp(channel->channel_name, w->names[p]) != 0)
-            p++;
-        const float *const rows = weft_image_row(w->image, p, y);
-        const void *source = rows;
-        if (w->type == WEFT_EXR_HALF) {
-            const size_t plane = (size_t)slot * (size_t)w->image->planes + (size_t)p;
-            uint16_t *const halves = w->halves + plane * (size_t)w->lines * width;
-            weft_half_from_float(halves, rows, n);
-            source = halves;
-        }
-        const int32_t size = w->type == WEFT_EXR_HALF ? 2 : 4;
-        channel->encode_from_ptr = source;
-        channel->user_data_type = channel->data_type;
-        channel->user_bytes_per_element = (int16_t)size;
-        channel->user_pixel_stride = size;
-        channel->user_line_stride = size * w->image->width;
-    }
-}
-
-/* One chunk per band, compressed into the slot of that band; write_slots() puts them in the file. */
-static void encode_chunk(void *context, int band, int row_begin, int row_end)
-{
-    exr_writer *const w = context;
-    (void)row_begin, (void)row_end;
-    const int y = (w->first_chunk + band) * w->lines;
-    exr_encode_pipeline_t *const pipe = &w->pipes[band];
-    exr_chunk_info_t chunk;
-    exr_result_t code = exr_write_scanline_chunk_info(w->context, w->part, y, &chunk);
-    if (code == EXR_ERR_SUCCESS && w->started[band])
-        code = exr_encoding_update(w->context, w->part, &chunk, pipe);
-    else if (code == EXR_ERR_SUCCESS) {
-        code = exr_encoding_initialize(w->context, w->part, &chunk, pipe);
-        w->started[band] = code == EXR_ERR_SUCCESS;
-    }
-    if (code == EXR_ERR_SUCCESS) {
-        aim_source(w, pipe, band, y);
-        code = exr_encoding_choose_default_routines(w->context, w->part, pipe);
-        pipe->yield_until_ready_fn = NULL;
-        pipe->write_fn = NULL;
-    }
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_encoding_run(w->context, w->part, pipe);
-    int success = EXR_ERR_SUCCESS;
-    if (code != EXR_ERR_SUCCESS)
-        atomic_compare_exchange_strong(&w->failed, &success, code);
-}
-
-static exr_result_t write_chunks(exr_writer *w)
-{
-    for (w->first_chunk = 0; w->first_chunk < w->n_chunks; w->first_chunk += CHUNKS_AT_ONCE) {
-        const int left = w->n_chunks - w->first_chunk;
-        const int n = left < CHUNKS_AT_ONCE ? left : CHUNKS_AT_ONCE;
-        weft_parallel_rows(n * WEFT_BAND_ROWS, encode_chunk, w);
-        if (w->failed != EXR_ERR_SUCCESS)
-            return w->failed;
-        for (int slot = 0; slot < n; slot++) {
-            const exr_encode_pipeline_t *const pipe = &w->pipes[slot];
-            const exr_result_t code = exr_write_scanline_chunk(
-                w->context, w->part, pipe->chunk.start_y, pipe->compressed_buffer, pipe->compressed_bytes);
-            if (code != EXR_ERR_SUCCESS)
-                return code;
-        }
-    }
-    return EXR_ERR_SUCCESS;
-}
-
-weft_err weft_exr_write(const char *path, const weft_image *image, const char *const *names,
-                        weft_exr_type type, weft_error *err)
-{
-    exr_writer w = {.image = image, .names = names, .type = type};
-    weft_atomic a = {0};
-    exr_result_t code = EXR_ERR_UNKNOWN;
-    WEFT_TRY(check_names(path, image, names, err));
-    WEFT_TRY(weft_atomic_file_begin(&a, path, err));
-    weft_err status = WEFT_OK;
-    const exr_context_initializer_t init = make_initializer(&w.report);
-    if ((code = exr_start_write(&w.context, a.temp_path, EXR_WRITE_FILE_DIRECTLY, &init)) !=
-            EXR_ERR_SUCCESS ||
-        (code = write_header(&w)) != EXR_ERR_SUCCESS)
-        goto out;
-    if (type == WEFT_EXR_HALF) {
-        const size_t n = (size_t)CHUNKS_AT_ONCE * (size_t)image->planes * (size_t)w.lines;
-        w.halves = weft_alloc(n, (size_t)image->width * sizeof *w.halves, err);
-        if (!w.halves) {
-            status = WEFT_ERR_NOMEM;
-            goto out;
-        }
-    }
-    code = write_chunks(&w);
-out:
-    for (int slot = 0; slot < CHUNKS_AT_ONCE; slot++)
-        if (w.started[slot])
-            exr_encoding_destroy(w.context, &w.pipes[slot]);
-    if (w.context) {
-        const exr_result_t finished = exr_finish(&w.context);
-        code = code == EXR_ERR_SUCCESS ? finished : code;
-    }
-    weft_free(w.halves);
-    if (status == WEFT_OK && code != EXR_ERR_SUCCESS)
-        status = weft_fail(err, WEFT_ERR_IO, "%s: cannot be written: %s; is the disk full?", path,
-                           words(&w.report, code));
-    if (status == WEFT_OK)
-        return weft_atomic_commit(&a, err);
-    weft_atomic_abort(&a);
     return status;
 }
