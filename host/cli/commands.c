@@ -12,6 +12,10 @@ extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_devices;
 extern const weft_command weft_cmd_import;
 extern const weft_command weft_cmd_rig;
+extern const weft_command weft_cmd_light_level;
+extern const weft_command weft_cmd_light_off;
+extern const weft_command weft_cmd_light_on;
+extern const weft_command weft_cmd_light_status;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_preview;
@@ -21,6 +25,10 @@ extern const weft_command weft_cmd_preview;
 const weft_command *const weft_commands[] = {
     &weft_cmd_rig,
     &weft_cmd_devices,
+    &weft_cmd_light_on,
+    &weft_cmd_light_level,
+    &weft_cmd_light_off,
+    &weft_cmd_light_status,
     &weft_cmd_capture,
     &weft_cmd_calibrate_lens,
     &weft_cmd_calibrate_linearity,
