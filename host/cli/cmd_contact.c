@@ -1,4 +1,5 @@
 #include "host/cli/command.h"
+#include "host/cli/contact_set.h"
 #include "host/cli/preview_input.h"
 
 #include "core/file.h"
@@ -201,52 +202,87 @@ static weft_err fill_block(block *b, weft_error *err)
     return place_preview(b, COLUMNS + N_LIGHTS + 1, WEFT_PREVIEW_SPHERE, upper_left, NULL, err);
 }
 
+/* The names of the inputs, each once when a set and its maps follow each other. */
 static char *sheet_title(const weft_invocation *inv, weft_error *err)
 {
-    char *title = NULL;
-    for (int i = 0; i < inv->n_operands; i++) {
+    char *title = weft_strdup("", err), *last = NULL;
+    for (int i = 0; i < inv->n_operands && title; i++) {
         char *const name = weft_preview_title(inv->operands[i], err);
+        const bool again = name && last && strcmp(name, last) == 0;
         char *const longer =
-            name ? weft_asprintf(err, "%s%s%s", title ? title : "", title ? ", " : "", name) : NULL;
-        weft_free(name);
+            name ? weft_asprintf(err, "%s%s%s", title, last && !again ? ", " : "", again ? "" : name) : NULL;
+        weft_free(last);
+        last = name;
         weft_free(title);
         title = longer;
-        if (!title)
-            return NULL;
     }
+    weft_free(last);
     return title;
 }
 
-static weft_err fill_sheet(const weft_invocation *inv, const contact_args *a, weft_sheet *sheet,
-                           weft_error *err)
+static weft_err count_rows(const weft_invocation *inv, int *rows, weft_error *err)
 {
+    *rows = 0;
     for (int i = 0; i < inv->n_operands; i++) {
-        weft_preview_input input;
-        WEFT_TRY(weft_preview_input_load(&input, inv->operands[i], a->brdf, &a->params, err));
-        const weft_err status = fill_block(
-            &(block){.sheet = sheet, .first_row = i * ROWS_PER_INPUT, .args = a, .input = &input}, err);
-        weft_preview_input_fini(&input);
-        if (status != WEFT_OK)
-            return weft_prefix(err, status, "%s", inv->operands[i]);
+        weft_set set;
+        if (!weft_contact_is_set(inv->operands[i])) {
+            *rows += ROWS_PER_INPUT;
+            continue;
+        }
+        WEFT_TRY(weft_set_load(inv->operands[i], &set, err));
+        *rows += weft_contact_set_rows(&set, COLUMNS);
+        weft_set_fini(&set);
     }
     return WEFT_OK;
+}
+
+static weft_err fill_maps(const char *path, const contact_args *a, weft_sheet *sheet, int *row,
+                          weft_error *err)
+{
+    weft_preview_input input;
+    WEFT_TRY(weft_preview_input_load(&input, path, a->brdf, &a->params, err));
+    const weft_err status =
+        fill_block(&(block){.sheet = sheet, .first_row = *row, .args = a, .input = &input}, err);
+    weft_preview_input_fini(&input);
+    *row += ROWS_PER_INPUT;
+    return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", path);
+}
+
+static weft_err fill_set(const char *path, weft_sheet *sheet, int *row, weft_error *err)
+{
+    weft_set set;
+    WEFT_TRY(weft_set_load(path, &set, err));
+    const weft_err status = weft_contact_set(sheet, *row, &set, err);
+    *row += weft_contact_set_rows(&set, COLUMNS);
+    weft_set_fini(&set);
+    return status;
+}
+
+static weft_err make_sheet(const weft_invocation *inv, const contact_args *a, weft_sheet *sheet,
+                           weft_error *err)
+{
+    int rows, row = 0;
+    WEFT_TRY(count_rows(inv, &rows, err));
+    char *const title = sheet_title(inv, err);
+    if (!title)
+        return WEFT_ERR_NOMEM;
+    weft_err status =
+        weft_sheet_init(sheet, COLUMNS, rows > 0 ? rows : 1, a->tile.width, a->tile.height, title, err);
+    weft_free(title);
+    for (int i = 0; i < inv->n_operands && status == WEFT_OK; i++)
+        status = weft_contact_is_set(inv->operands[i]) ? fill_set(inv->operands[i], sheet, &row, err)
+                                                       : fill_maps(inv->operands[i], a, sheet, &row, err);
+    return status;
 }
 
 static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const contact_args *const a = args;
-    weft_sheet sheet;
+    weft_sheet sheet = {0};
     WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     if (a->lights.n != 2 * N_LIGHTS)
         return weft_fail(err, WEFT_ERR_USAGE, "--lights wants six numbers: AZ,EL of three lights");
-    char *const title = sheet_title(inv, err);
-    if (!title)
-        return WEFT_ERR_NOMEM;
-    weft_err status = weft_sheet_init(&sheet, COLUMNS, inv->n_operands * ROWS_PER_INPUT, a->tile.width,
-                                      a->tile.height, title, err);
-    weft_free(title);
-    WEFT_TRY(status);
-    status = fill_sheet(inv, a, &sheet, err);
+    weft_err status = make_sheet(inv, a, &sheet, err);
     const int width = sheet.image.width, height = sheet.image.height;
     if (status == WEFT_OK)
         status = weft_image_write(a->output, &sheet.image, 8, WEFT_TRANSFER_SRGB, err);
@@ -261,16 +297,18 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
 
 const weft_command weft_cmd_contact = {
     .name = "contact",
-    .summary = "a sheet with the maps and previews of one or more samples",
-    .operands = "MAPS...",
+    .summary = "a sheet with the maps and previews of samples, or the frames of sets",
+    .operands = "MAPS|SET...",
     .min_operands = 1,
     .max_operands = -1,
     .args_size = sizeof(contact_args),
     .fields = fields,
     .details =
-        "For each folder of maps: albedo, normal (as the usual picture), residual and confidence in false\n"
-        "colour, then the cloth under three lights and on a ball.  The residual's scale ends where 99 % of\n"
-        "the pixels are below.",
-    .example = "weft contact twill.maps plain-weave.maps -o sheet.png --brdf cloth",
+        "For each folder of maps: albedo, normal (as the usual picture, whole and pixel by pixel), residual\n"
+        "and confidence in false colour, then the cloth under three lights, its middle pixel by pixel, and "
+        "on\n"
+        "a ball.  The residual's scale ends where 99 % of the pixels are below.  For each captured set: its\n"
+        "frames in the camera's colours, balanced, under one exposure.",
+    .example = "weft contact twill.set twill.maps -o sheet.png --brdf cloth",
     .run = run,
 };

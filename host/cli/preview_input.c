@@ -74,8 +74,10 @@ char *weft_preview_title(const char *folder, weft_error *err)
         return NULL;
     for (size_t n = strlen(path); n > 1 && path[n - 1] == '/'; n--)
         path[n - 1] = '\0';
-    if (weft_path_has_suffix(path, ".maps") && strlen(weft_path_name(path)) > 5)
-        path[strlen(path) - 5] = '\0';
+    static const char *const endings[] = {".maps", ".set"};
+    for (int i = 0; i < 2; i++)
+        if (weft_path_has_suffix(path, endings[i]) && strlen(weft_path_name(path)) > strlen(endings[i]))
+            path[strlen(path) - strlen(endings[i])] = '\0';
     char *const title = weft_strdup(weft_path_name(path), err);
     weft_free(path);
     return title;

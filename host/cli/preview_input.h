@@ -24,7 +24,7 @@ weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, 
                                  const weft_texts *params, weft_error *err);
 void weft_preview_input_fini(weft_preview_input *input);
 
-/** Last part of a path, without trailing slashes and without ".maps"; on the heap. */
+/** Last part of a path, without trailing slashes and without ".maps" or ".set"; on the heap. */
 char *weft_preview_title(const char *folder, weft_error *err);
 
 #endif

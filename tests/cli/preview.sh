@@ -33,7 +33,59 @@ expect 0 '"width":64' "$weft" preview weave.maps/ -o ball.png --json --shape sph
     --size 64x48 --fov 20 --light 60,20
 is_png ball.png 64 48
 expect 0 'point.exr' "$weft" preview weave.maps -o point.exr --light-mm=-20,0,40 --brdf ggx --param alpha=weave.maps/confidence.exr
-expect 0 'sheet.png: 2172 x ' "$weft" contact weave.maps sensor.maps -o sheet.png
+expect 0 'sheet.png: 672 x ' "$weft" contact weave.maps sensor.maps -o sheet.png --tile 120x80
+
+# a captured set of three small mosaics: the red light is twice as bright as the other, which must stay visible
+python3 - <<'EOF'
+import json, os, struct, zlib
+def png(path, rows):
+    data = b"".join(b"\0" + b"".join(struct.pack(">H", v) for v in row) for row in rows)
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 16, 0, 0, 0, 0)
+    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+os.mkdir("small.set")
+frames = []
+for name, level, role in (("ambient", 300, "ambient"), ("a", 4256, "light"), ("b", 2256, "light")):
+    png(f"small.set/{name}.png", [[level if (x < 16) else 256 for x in range(32)] for y in range(24)])
+    frames.append({"file": name + ".png", "role": role, "exposure_s": 0.1, "gain": 1.0})
+    if role == "light":
+        frames[-1]["light"] = len(frames) - 2
+json.dump({"weft": "set", "version": 1, "name": "small", "created": "2026-11-23T10:00:00Z", "state": "complete",
+           "sensor": {"width": 32, "height": 24, "cfa": "RGGB", "black": [256] * 4, "white": 15871},
+           "frames": frames}, open("small.set/set.json", "w"))
+EOF
+expect 0 'frames.png: 172 x' "$weft" contact small.set -o frames.png --tile 20x20
+# the first tile is light 0: left half at white (255), right half black; the second, half as bright, 188
+python3 - <<'EOF'
+import struct, zlib
+data, at, body = open("frames.png", "rb").read(), 8, b""
+while at < len(data):
+    n, kind = struct.unpack(">I4s", data[at:at + 8])
+    if kind == b"IHDR":
+        width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
+    if kind == b"IDAT":
+        body += data[at + 8:at + 8 + n]
+    at += 12 + n
+assert (depth, colour) == (8, 2)
+raw, rows, stride = zlib.decompress(body), [], 3 * width
+above = bytearray(stride)
+for y in range(height):
+    kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+    for i in range(stride):
+        left, up, corner = line[i - 3] if i > 2 else 0, above[i], above[i - 3] if i > 2 else 0
+        p = left + up - corner
+        paeth = min((left, up, corner), key=lambda v: (abs(p - v), 0))
+        line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[kind]) & 255
+    rows.append(line)
+    above = line
+def pixel(x, y):
+    return tuple(rows[y][3 * x:3 * x + 3])
+top = 12 + 28 + 10 # gap, title, middle of a tile
+assert pixel(12 + 5, top) == (255, 255, 255), pixel(12 + 5, top)
+assert pixel(12 + 15, top) == (0, 0, 0), pixel(12 + 15, top)
+assert pixel(12 + 32 + 5, top) == (188, 188, 188), pixel(12 + 32 + 5, top)
+EOF
 
 # light from the left brightens the left flanks: the picture under 180,30 and under 0,30 must differ, and the
 # same command must give the same bytes
@@ -56,6 +108,8 @@ expect 2 'four numbers' "$weft" preview weave.maps -o x.png --crop 0,0,4
 expect 2 'X,Y,Z' "$weft" preview weave.maps -o x.png --light-mm 0,0,0
 expect 2 'six numbers' "$weft" contact weave.maps -o x.png --lights 1,2
 expect 1 'have none' "$weft" preview sensor.maps -o x.png --light-mm 0,0,100
+sed 's/"width": 32/"width": 64/' small.set/set.json >json && cp -r small.set wrong.set && mv json wrong.set/set.json
+expect 1 'wrong.set' "$weft" contact wrong.set -o x.png
 expect 1 'absent.maps' "$weft" preview absent.maps -o x.png
 expect 1 'no/such/x.png' "$weft" preview weave.maps -o no/such/x.png
 printf 'not a picture' >broken.exr
