@@ -172,11 +172,9 @@ static void splat_run(const render *r, const weft_preview_samples *s, int first,
 {
     const int ss = r->setup->supersampling, begin = first + ss / 2; /* samples from the left neighbour on */
     const int n_pixels = (begin + s->n - 1) / ss - begin / ss + 2;
-    double sums[WEFT_PREVIEW_RUN / 2 + 2];
     for (int c = 0; c < 3; c++) {
+        double sums[WEFT_PREVIEW_RUN / 2 + 2] = {0};
         int pixel = 0, k = begin % ss;
-        for (int p = 0; p < n_pixels; p++)
-            sums[p] = 0;
         for (int i = 0; i < s->n; i++) {
             const double right = (k + 0.5) / ss;
             sums[pixel] += (1 - right) * s->value[c][i];

@@ -3,13 +3,6 @@
 #include "core/clones.h"
 #include "shading/brdf/half.h"
 
-/* The four texels around each place and their shares; masked ones have none. */
-typedef struct taps {
-    int at[4][WEFT_PREVIEW_RUN];
-    double share[4][WEFT_PREVIEW_RUN];
-    double sign[3][WEFT_PREVIEW_RUN]; /* of the normal: -1 where a mirrored repeat turned the axis round */
-} taps;
-
 /* Folds a coordinate into 0..size-1 by mirroring at the edges of the texels (-0.5 and size - 0.5). */
 static inline double mirror(double t, double size, double *sign)
 {
@@ -20,7 +13,7 @@ static inline double mirror(double t, double size, double *sign)
 }
 
 WEFT_CLONES
-static void place_taps(const weft_preview_setup *setup, const weft_preview_samples *s, taps *t)
+static void place_taps(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_crop crop = setup->crop;
     const int right = crop.x + crop.width - 1, bottom = crop.y + crop.height - 1;
@@ -32,59 +25,58 @@ static void place_taps(const weft_preview_setup *setup, const weft_preview_sampl
         const double y = crop.y + mirror(s->v[i], crop.height, &sign_y);
         const int x0 = (int)x, y0 = (int)y, x1 = x0 < right ? x0 + 1 : x0, y1 = y0 < bottom ? y0 + 1 : y0;
         const double fx = x - x0, fy = y - y0;
-        t->at[0][i] = y0 * stride + x0;
-        t->at[1][i] = y0 * stride + x1;
-        t->at[2][i] = y1 * stride + x0;
-        t->at[3][i] = y1 * stride + x1;
-        t->share[0][i] = (1 - fx) * (1 - fy);
-        t->share[1][i] = fx * (1 - fy);
-        t->share[2][i] = (1 - fx) * fy;
-        t->share[3][i] = fx * fy;
-        t->sign[0][i] = sign_x;
-        t->sign[1][i] = sign_y;
-        t->sign[2][i] = 1;
+        s->at[0][i] = y0 * stride + x0;
+        s->at[1][i] = y0 * stride + x1;
+        s->at[2][i] = y1 * stride + x0;
+        s->at[3][i] = y1 * stride + x1;
+        s->share[0][i] = (1 - fx) * (1 - fy);
+        s->share[1][i] = fx * (1 - fy);
+        s->share[2][i] = (1 - fx) * fy;
+        s->share[3][i] = fx * fy;
+        s->sign[0][i] = sign_x;
+        s->sign[1][i] = sign_y;
     }
 }
 
 /* Takes the shares of masked texels away; where most is masked, so is the place. */
-static void apply_mask(const weft_mask *mask, weft_preview_samples *s, taps *t)
+static void apply_mask(const weft_mask *mask, weft_preview_samples *s)
 {
     for (int i = 0; i < s->n; i++) {
         double sum = 0;
         for (int k = 0; k < 4; k++) {
-            t->share[k][i] = mask->data[t->at[k][i]] ? t->share[k][i] : 0;
-            sum += t->share[k][i];
+            s->share[k][i] = mask->data[s->at[k][i]] ? s->share[k][i] : 0;
+            sum += s->share[k][i];
         }
         for (int k = 0; k < 4 && sum > 0; k++)
-            t->share[k][i] /= sum;
+            s->share[k][i] /= sum;
         if (sum < 0.5)
             s->hit[i] = 0;
     }
 }
 
 WEFT_CLONES
-static void fetch(const weft_image *image, int plane, const taps *t, int n, double *to)
+static void fetch(const weft_image *image, int plane, const weft_preview_samples *s, double *to)
 {
     const float *const from = weft_image_plane(image, plane);
     WEFT_INDEPENDENT
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < s->n; i++) {
         double sum = 0;
         for (int k = 0; k < 4; k++) {
-            const double texel = (double)from[t->at[k][i]];
-            sum += t->share[k][i] > 0 ? t->share[k][i] * texel : 0; /* a masked texel may be NaN */
+            const double texel = (double)from[s->at[k][i]];
+            sum += s->share[k][i] > 0 ? s->share[k][i] * texel : 0; /* a masked texel may be NaN */
         }
         to[i] = sum;
     }
 }
 
 WEFT_CLONES
-static void fetch_normals(const weft_image *normal, const taps *t, weft_preview_samples *s)
+static void fetch_normals(const weft_image *normal, weft_preview_samples *s)
 {
     for (int c = 0; c < 3; c++)
-        fetch(normal, c, t, s->n, s->normal[c]);
+        fetch(normal, c, s, s->normal[c]);
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
-        const double x = t->sign[0][i] * s->normal[0][i], y = t->sign[1][i] * s->normal[1][i];
+        const double x = s->sign[0][i] * s->normal[0][i], y = s->sign[1][i] * s->normal[1][i];
         const double z = s->normal[2][i], length2 = x * x + y * y + z * z;
         const double known = length2 > 1e-12 ? 1 : 0; /* NaN fails the test too */
         const double inverse = 1 / sqrt(known > 0 ? length2 : 1);
@@ -114,18 +106,17 @@ static void clamp(double *values, int n, double low, double high)
 void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_surface *const surface = setup->surface;
-    taps t;
-    place_taps(setup, s, &t);
+    place_taps(setup, s);
     if (surface->mask)
-        apply_mask(surface->mask, s, &t);
+        apply_mask(surface->mask, s);
     if (surface->normal)
-        fetch_normals(surface->normal, &t, s);
+        fetch_normals(surface->normal, s);
     else
         flat_normals(s);
     for (int k = 0; k < weft_brdf_n_planes(surface->brdf); k++) {
         const weft_preview_map map = surface->maps[k];
         if (map.image)
-            fetch(map.image, map.plane, &t, s->n, s->param[k]);
+            fetch(map.image, map.plane, s, s->param[k]);
         for (int i = 0; i < s->n && !map.image; i++)
             s->param[k][i] = surface->params[k];
         clamp(s->param[k], s->n, setup->low[k], setup->high[k]);

@@ -15,7 +15,10 @@ typedef struct weft_preview_samples {
     double axis[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the shape */
     double eye[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the viewer */
     double lamp[3][WEFT_PREVIEW_RUN];                /* world, unit, towards the light */
-    double normal[3][WEFT_PREVIEW_RUN];              /* tangent space, from the map */
+    int at[4][WEFT_PREVIEW_RUN];                     /* the four texels around the place, index in a plane */
+    double share[4][WEFT_PREVIEW_RUN];               /* of each; masked ones have none */
+    double sign[2][WEFT_PREVIEW_RUN];   /* of the normal: -1 where a mirrored repeat turned X or Y round */
+    double normal[3][WEFT_PREVIEW_RUN]; /* tangent space, from the map */
     double param[WEFT_BRDF_MAX_PLANES][WEFT_PREVIEW_RUN];
     double light[3][WEFT_PREVIEW_RUN], view[3][WEFT_PREVIEW_RUN]; /* local frame of the shading normal */
     double irradiance[WEFT_PREVIEW_RUN];                          /* share of the light's, with the cosine */
