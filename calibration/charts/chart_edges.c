@@ -99,7 +99,7 @@ static double crossing(const double *profile, int n)
 static bool see_edge(const piece *p, const weft_image *contrast, const weft_mat3 *map,
                      weft_homography_sight *sight)
 {
-    double profile[PROFILE_MAX];
+    double profile[PROFILE_MAX] = {0};
     const int n = read_profile(p, contrast, map, profile);
     const double at = n ? crossing(profile, n) : -1;
     if (at < 0)

@@ -33,7 +33,8 @@ static bool read_patch(const weft_chart *chart, const weft_image *cells, const w
     const int n = count_spots(chart, to_cell, x, y);
     const double step = middle * chart->patch_mm / n;
     for (int k = 0; k < n * n; k++) {
-        const double dx = (k % n - 0.5 * (n - 1)) * step, dy = (k / n - 0.5 * (n - 1)) * step;
+        const int i = k % n, j = k / n;
+        const double dx = (i - 0.5 * (n - 1)) * step, dy = (j - 0.5 * (n - 1)) * step;
         if (!weft_homography_apply(to_cell, x + dx, y + dy, &u, &v) ||
             !(u >= 0 && v >= 0 && u <= cells->width - 1 && v <= cells->height - 1))
             return false;
