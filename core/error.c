@@ -1,5 +1,7 @@
 #include "core/error.h"
 
+#include "core/text.h"
+
 #include <assert.h>
 #include <errno.h>
 #include <stdio.h>
@@ -17,6 +19,22 @@ static const struct {
 
 enum { N_CODES = sizeof codes / sizeof codes[0] };
 
+/* Names out of damaged files must not break the promise of one line of UTF-8: what is no letter becomes '?'.
+ */
+static void make_one_line(char *text)
+{
+    while (*text) {
+        size_t n = 1;
+        while (n < 4 && text[n] && !weft_text_is_utf8(text, n))
+            n++;
+        if ((unsigned char)*text < ' ' || *text == 0x7f || !weft_text_is_utf8(text, n)) {
+            *text = '?';
+            n = 1;
+        }
+        text += n;
+    }
+}
+
 weft_err(weft_fail)(weft_error *err, weft_err code, const char *format, ...)
 {
     assert(code != WEFT_OK);
@@ -26,6 +44,7 @@ weft_err(weft_fail)(weft_error *err, weft_err code, const char *format, ...)
         err->code = code;
         vsnprintf(err->text, sizeof err->text, format, args);
         va_end(args);
+        make_one_line(err->text);
     }
     return code;
 }
@@ -42,6 +61,7 @@ weft_err(weft_fail_errno)(weft_error *err, weft_err code, const char *format, ..
         va_end(args);
         const size_t used = strlen(err->text);
         snprintf(err->text + used, sizeof err->text - used, ": %s", strerror(number));
+        make_one_line(err->text);
     }
     return code;
 }
@@ -58,6 +78,7 @@ weft_err(weft_prefix)(weft_error *err, weft_err code, const char *format, ...)
     va_end(args);
     const size_t used = strlen(err->text);
     snprintf(err->text + used, sizeof err->text - used, ": %s", was);
+    make_one_line(err->text);
     return code;
 }
 

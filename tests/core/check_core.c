@@ -31,6 +31,21 @@ static void test_error_text_is_kept_and_prefixed(void **state)
     assert_string_equal(weft_err_name(WEFT_ERR_FORMAT), "FORMAT");
 }
 
+static void test_error_text_is_one_line_of_utf8(void **state)
+{
+    (void)state;
+    weft_error error;
+    weft_fail(&error, WEFT_ERR_FORMAT, "a\nb\x1b[1m\xff %s\xe2\x82", "\xc3\xa9\xf0\x9f\xa7\xb5");
+    assert_string_equal(error.text, "a?b?[1m? \xc3\xa9\xf0\x9f\xa7\xb5??");
+    weft_prefix(&error, WEFT_ERR_FORMAT, "x\ty");
+    assert_string_equal(error.text, "x?y: a?b?[1m? \xc3\xa9\xf0\x9f\xa7\xb5??");
+    char long_text[2048];
+    memset(long_text, 'a', sizeof long_text);
+    memcpy(long_text + sizeof error.text - 2, "\xc3\xa9", 3); /* cut in the middle of a letter */
+    weft_fail(&error, WEFT_ERR_FORMAT, "%s", long_text);
+    assert_true(weft_text_is_utf8(error.text, strlen(error.text)));
+}
+
 static void test_numbers_ignore_the_locale(void **state)
 {
     (void)state;
@@ -340,6 +355,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_error_text_is_kept_and_prefixed),
+        cmocka_unit_test(test_error_text_is_one_line_of_utf8),
         cmocka_unit_test(test_numbers_ignore_the_locale),
         cmocka_unit_test(test_utf8),
         cmocka_unit_test(test_options_parse),
