@@ -6,6 +6,7 @@
 #include "shading/brdf/brdf.h"
 #include "shading/vectors/vectors.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct brdf_args {
@@ -109,6 +110,17 @@ static weft_err print_table(FILE *out, const weft_csv *csv, int n, char (*names)
     return WEFT_OK;
 }
 
+/* A function that is asked outside its domain answers NaN: that is no row to print. */
+static weft_err check_finite(const double *values, int rows, int n, const char *path, weft_error *err)
+{
+    for (int row = 0; row < rows; row++)
+        for (int k = 0; k < n; k++)
+            if (!isfinite(values[(size_t)k * (size_t)rows + (size_t)row]))
+                return weft_fail(err, WEFT_ERR_FORMAT,
+                                 "%s: row %d: there is no value; is an input out of range?", path, row + 1);
+    return WEFT_OK;
+}
+
 static weft_err eval_function(const weft_invocation *inv, const weft_vectors_model *model,
                               const weft_csv *csv, const char *path, weft_error *err)
 {
@@ -120,7 +132,9 @@ static weft_err eval_function(const weft_invocation *inv, const weft_vectors_mod
         weft_vectors_word(model->outputs, k, word);
         snprintf(names[k], sizeof names[k], n == 1 ? "value" : "value_%s", word);
     }
-    const weft_err status = print_table(inv->out, csv, n, names, values, err);
+    weft_err status = check_finite(values, csv->rows, n, path, err);
+    if (status == WEFT_OK)
+        status = print_table(inv->out, csv, n, names, values, err);
     weft_free(values);
     return status;
 }

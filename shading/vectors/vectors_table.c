@@ -12,7 +12,7 @@ static double eval_at(const char *name, const double *values, double nl, double 
     const weft_brdf *brdf;
     double l[3], v[3], f[3];
     if (weft_brdf_find(name, &brdf, NULL) != WEFT_OK)
-        return NAN;
+        return (double)NAN;
     weft_brdf_direction(nl, phi_l, l);
     weft_brdf_direction(nv, phi_v, v);
     weft_brdf_eval_one(brdf, values, l, v, f);
@@ -74,6 +74,13 @@ static void diffuse(int n, const double *const *in, double *const *out)
     }
 }
 
+/* Views of integrals: raised to 1e-4 as for every model (S-CNV-02); what is no cosine gives NaN. */
+static bool usable_view(double *nv)
+{
+    *nv = weft_max(*nv, WEFT_MIN_NV);
+    return *nv <= 1;
+}
+
 /* K of S-ORD-08: the albedo of the balanced Lambert at F0 = 0. */
 static void diffuse_albedo(int n, const double *const *in, double *const *out)
 {
@@ -82,8 +89,9 @@ static void diffuse_albedo(int n, const double *const *in, double *const *out)
     if (weft_brdf_find("lambert-balanced", &brdf, NULL) != WEFT_OK)
         return;
     for (int i = 0; i < n; i++) {
-        double albedo[3];
-        weft_brdf_albedo(brdf, values, in[0][i], 0, WEFT_ALBEDO_EXACT, albedo);
+        double albedo[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[0][i];
+        if (usable_view(&nv))
+            weft_brdf_albedo(brdf, values, nv, 0, WEFT_ALBEDO_EXACT, albedo);
         out[0][i] = albedo[0];
     }
 }
@@ -105,9 +113,10 @@ static void furnace_integrand(void *context, const weft_brdf_batch *b, double *c
 static void ggx_furnace(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
-        double alpha = in[0][i], sum[3];
-        weft_albedo_integrate(furnace_integrand, &alpha, WEFT_ALBEDO_UPPER, in[1][i], 0, false,
-                              WEFT_ALBEDO_EXACT, sum);
+        double alpha = in[0][i], sum[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[1][i];
+        if (usable_view(&nv))
+            weft_albedo_integrate(furnace_integrand, &alpha, WEFT_ALBEDO_UPPER, nv, 0, false,
+                                  WEFT_ALBEDO_EXACT, sum);
         for (int c = 0; c < 3; c++)
             out[c][i] = sum[c];
     }
@@ -136,8 +145,9 @@ static void cloth_albedo(int n, const double *const *in, double *const *out)
         return;
     for (int i = 0; i < n; i++) {
         const double values[WEFT_BRDF_MAX_PLANES] = {0, 0, 0, 0, 1, 1, in[0][i], 4};
-        double albedo[3];
-        weft_brdf_albedo(brdf, values, in[1][i], 0, WEFT_ALBEDO_EXACT, albedo);
+        double albedo[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[1][i];
+        if (usable_view(&nv))
+            weft_brdf_albedo(brdf, values, nv, 0, WEFT_ALBEDO_EXACT, albedo);
         out[0][i] = albedo[1] - albedo[0];
         out[1][i] = albedo[0];
         out[2][i] = albedo[1];

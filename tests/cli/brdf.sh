@@ -50,3 +50,7 @@ bad '"x" is not a number' 'nl,nv' 'x,1'
 expect 2 'it has albedo, f0, alpha' "$weft" brdf ggx --eval "$work/t.csv" --param roughness=1
 expect 2 'wants the NAME' "$weft" brdf --eval "$work/t.csv"
 expect 1 'absent.csv' "$weft" brdf ggx --eval "$work/absent.csv"
+printf 'alpha,nv\n0.5,0.5\n0.5,1.5\n' >"$work/t.csv"
+expect 1 'row 2: there is no value' "$weft" brdf cloth_albedo --eval "$work/t.csv"
+printf 'alpha,nv\n0.5,0\n' >"$work/t.csv"
+expect 0 '0.5,0,' "$weft" brdf ggx_furnace --eval "$work/t.csv"
