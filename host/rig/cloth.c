@@ -102,6 +102,7 @@ static double on_top(const weft_weave *weave, const yarn_system *system, int k, 
 /* Where a point is on a yarn. */
 typedef struct on_yarn {
     double height; /* mm, of the smooth yarn; -1e9 beside it */
+    double next;   /* of the second highest of the system */
     double across; /* -1..1 */
     int k;
 } on_yarn;
@@ -143,7 +144,7 @@ static void place_yarn(const weft_weave *weave, yarn_system *system, int k)
 /* The highest yarn of a system at a point; `along` is the texel with the yarns, `across` mm over them. */
 static on_yarn highest_yarn(const yarn_system *system, int along, double across)
 {
-    on_yarn best = {.height = -1e9};
+    on_yarn best = {.height = -1e9, .next = -1e9};
     const int nearest = (int)floor(across / system->pitch_mm);
     for (int i = nearest - 1; i <= nearest + 1; i++) {
         const int k = i < 0 ? i + system->n : i >= system->n ? i - system->n : i;
@@ -155,7 +156,9 @@ static on_yarn highest_yarn(const yarn_system *system, int along, double across)
             continue;
         const double h = (double)place->axis_mm + lens_section(u, half_width, (double)place->sagitta_mm);
         if (h > best.height)
-            best = (on_yarn){.height = h, .across = u, .k = k};
+            best = (on_yarn){.height = h, .next = best.height, .across = u, .k = k};
+        else
+            best.next = fmax(best.next, h);
     }
     return best;
 }
@@ -177,20 +180,25 @@ static void weave_texel(const loom *l, int column, int row, weft_cloth_texel *te
     const on_yarn *const top = is_warp ? &warp : &weft;
     const yarn *const spun = &system->yarns[top->k];
     const double along = is_warp ? y : x;
-    /* Fine relief fades out where two yarns meet, so that the seam stays a crease and does not become a
-     * cliff. */
-    const double margin = fmin(fabs(warp.height - weft.height) / 0.05, 1);
+    const double second = fmax(fmin(warp.height, weft.height), top->next);
+    const double gap = top->height - second;
+    /* Fibres of two yarns fill the seam between them: a smooth maximum instead of a knife's edge.  Fine
+       relief fades out there, so that the seam does not become a cliff. */
+    const double reach = fmin(weave->warp_bulge_mm, weave->weft_bulge_mm) * 2 / 3;
+    const double near = fmax(1 - gap / reach, 0);
+    const double seam = 0.25 * reach * near * near;
+    const double margin = fmin(gap / (0.3 * reach), 1);
     const double edge = sqrt(fmax(1 - top->across * top->across, 0));
     const double fade = margin * fmin(edge * 2, 1);
     const double arc = asin(fmin(fmax(top->across, -1), 1)) * system->pitch_mm / 2;
     const double twist = weave->ply_angle_deg * TWO_PI / 360;
     const double ply =
         cos(TWO_PI / weave->ply_mm * (arc * cos(twist) - along * sin(twist)) + spun->ply_phase);
-    const int fine = (int)(WEFT_CLOTH_PERIOD_MM / 0.13), coarse = (int)(WEFT_CLOTH_PERIOD_MM / 0.6);
+    const int fine = (int)(WEFT_CLOTH_PERIOD_MM / 0.2), coarse = (int)(WEFT_CLOTH_PERIOD_MM / 0.6);
     const double hair =
         is_warp ? noise(l->seed, 0, x, y, fine, coarse) : noise(l->seed, 1, x, y, coarse, fine);
-    texel->height =
-        (float)(top->height + fade * (weave->ply_relief_mm * ply + 0.35 * weave->ply_relief_mm * hair));
+    texel->height = (float)(top->height + seam +
+                            fade * (weave->ply_relief_mm * ply + 0.35 * weave->ply_relief_mm * hair));
     texel->dye = (uint8_t)(system->sett[top->k % (int)strlen(system->sett)] - '0');
     const double patchy = noise(l->seed, is_warp ? 2 : 3, x, y, 30, 30);
     const double strength = spun->strength + 0.03 * hair + 0.01 * patchy;
