@@ -85,7 +85,7 @@ static int choose_step_log2(const lattice *l, double height_mm)
             nearest_mm = fmin(nearest_mm, weft_length(weft_sub(l->cal->lights[j].position, middle)));
     const double pixel_mm = weft_length(weft_sub(beside, middle));
     int step_log2 = 4;
-    while (step_log2 > 0 && ldexp(pixel_mm, step_log2) > nearest_mm / 150)
+    while (step_log2 > 0 && ldexp(pixel_mm, step_log2) > nearest_mm / 120)
         step_log2--;
     return step_log2;
 }

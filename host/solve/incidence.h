@@ -4,7 +4,7 @@
  * The world position and the strength of a light vary smoothly over the frame, so they are worked out in
  * double at the nodes of a lattice and interpolated linearly between; the direction to the light, which
  * the normal hangs on, is computed from the position at every pixel.  The step is halved until it is at
- * most 1/150 of the distance of the nearest light: the strength is then right to 1.2e-5.
+ * most 1/120 of the distance of the nearest light: the strength is then right to 2e-5.
  */
 #ifndef WEFT_HOST_SOLVE_INCIDENCE_H
 #define WEFT_HOST_SOLVE_INCIDENCE_H

@@ -21,8 +21,9 @@ WEFT_INLINE void add_up(const weft_solve_samples *s, lane_sums *restrict to)
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++) {
-            const float w = s->weight[j][k], grey = s->grey[j][k];
-            const float x = w * s->light[0][j][k], y = w * s->light[1][j][k], z = w * s->light[2][j][k];
+            const float w = s->at[j].weight[k], grey = s->at[j].grey[k];
+            const float x = w * s->at[j].light[0][k], y = w * s->at[j].light[1][k],
+                        z = w * s->at[j].light[2][k];
             t.n[k] += w;
             t.xx[k] += x * x, t.xy[k] += x * y, t.xz[k] += x * z;
             t.yy[k] += y * y, t.yz[k] += y * z, t.zz[k] += z * z;
@@ -109,9 +110,9 @@ WEFT_INLINE void measure(const weft_solve_samples *s, const lane_normals *scaled
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++) {
-            const float fit = scaled->x[k] * s->light[0][j][k] + scaled->y[k] * s->light[1][j][k] +
-                              scaled->z[k] * s->light[2][j][k];
-            const float d = s->weight[j][k] * (s->grey[j][k] - fit), used = s->weight[j][k] * fit;
+            const float fit = scaled->x[k] * s->at[j].light[0][k] + scaled->y[k] * s->at[j].light[1][k] +
+                              scaled->z[k] * s->at[j].light[2][k];
+            const float d = s->at[j].weight[k] * (s->at[j].grey[k] - fit), used = s->at[j].weight[k] * fit;
             m.squares[k] += d * d;
             m.brightest[k] = used > m.brightest[k] ? used : m.brightest[k];
         }
@@ -152,9 +153,9 @@ WEFT_INLINE void find_albedo(const weft_solve_samples *s, int c, const lane_norm
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++)
-            sum[k] += s->value[c][j][k] *
-                      (a->normal[0][k] * s->light[0][j][k] + a->normal[1][k] * s->light[1][j][k] +
-                       a->normal[2][k] * s->light[2][j][k]);
+            sum[k] += s->at[j].value[c][k] *
+                      (a->normal[0][k] * s->at[j].light[0][k] + a->normal[1][k] * s->at[j].light[1][k] +
+                       a->normal[2][k] * s->at[j].light[2][k]);
     for (int k = 0; k < LANES; k++)
         a->albedo[c][k] = scaled->gain[k] * sum[k];
 }

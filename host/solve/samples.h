@@ -11,15 +11,20 @@
 
 #define WEFT_SOLVE_LANES 16
 
-/** Reflected light over incident light: I'_j = k (n . l_j) for a Lambertian surface (S-ORD-17). */
+/** One light's samples: reflected light over incident light, I'_j = k (n . l_j) for a Lambertian surface
+ *  (S-ORD-17). */
+typedef struct weft_solve_light {
+    float light[3][WEFT_SOLVE_LANES]; /* unit, towards the light, world X Y Z */
+    float value[3][WEFT_SOLVE_LANES]; /* I', white balanced; finite */
+    float grey[WEFT_SOLVE_LANES];     /* 0.2126 R + 0.7152 G + 0.0722 B of it */
+    float weight[WEFT_SOLVE_LANES];   /* 1 to be used, 0 left out (values are then 0) */
+} weft_solve_light;
+
 typedef struct weft_solve_samples {
     int n_lights;
     /* 3: `value` holds the channels; 1: sites of a mosaic, each of one colour, which is value[0] and grey */
     int n_channels;
-    float light[3][WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES]; /* unit, towards the light, world X Y Z */
-    float value[3][WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES]; /* I', white balanced; finite */
-    float grey[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES];     /* 0.2126 R + 0.7152 G + 0.0722 B of it */
-    float weight[WEFT_LIGHTS_MAX][WEFT_SOLVE_LANES];   /* 1 to be used, 0 left out (values are then 0) */
+    _Alignas(64) weft_solve_light at[WEFT_LIGHTS_MAX];
 } weft_solve_samples;
 
 typedef struct weft_solve_answers {

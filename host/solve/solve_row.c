@@ -11,13 +11,13 @@ enum { LANES = WEFT_SOLVE_LANES, STRIDE_MAX = (WEFT_INCIDENCE_PLANES(WEFT_LIGHTS
 typedef struct block_nodes {
     float at[LANES + 1][STRIDE_MAX];
     float part[LANES]; /* of the way to the next node */
-    int step_log2;
 } block_nodes;
 
-WEFT_INLINE void interpolate_nodes(const weft_incidence *inc, int row, int block, block_nodes *to)
+WEFT_INLINE void interpolate_nodes(const weft_incidence *inc, int step_log2, int row, int block,
+                                   block_nodes *to)
 {
-    const int node_row = row >> inc->step_log2, n = LANES >> inc->step_log2;
-    const float t = (float)(row - (node_row << inc->step_log2)) / (float)(1 << inc->step_log2);
+    const int node_row = row >> step_log2, n = LANES >> step_log2;
+    const float t = (float)(row - (node_row << step_log2)) / (float)(1 << step_log2);
     const size_t row_floats = (size_t)inc->columns * (size_t)inc->stride;
     const float *const top = inc->nodes + (size_t)node_row * row_floats;
     for (int i = 0; i <= n; i++) {
@@ -30,20 +30,16 @@ WEFT_INLINE void interpolate_nodes(const weft_incidence *inc, int row, int block
     }
 }
 
-/* One plane from its nodes to the lanes. */
-WEFT_INLINE void expand(const block_nodes *nodes, int plane, float to[LANES])
+/* One plane from its nodes to the lanes, cells of 1 << step_log2 lanes.  The step is a constant where this is
+ * called, so that the usual one, a single cell, becomes straight vector code. */
+WEFT_INLINE void expand(const block_nodes *nodes, int step_log2, int plane, float to[LANES])
 {
-    if (nodes->step_log2 == 4) { /* one cell is the block: the usual case */
-        const float a = nodes->at[0][plane], d = nodes->at[1][plane] - a;
+    const int step = 1 << step_log2;
+    for (int i = 0; i < LANES >> step_log2; i++) {
+        const float a = nodes->at[i][plane], d = nodes->at[i + 1][plane] - a;
 #pragma omp simd
-        for (int k = 0; k < LANES; k++)
-            to[k] = a + nodes->part[k] * d;
-        return;
-    }
-    for (int k = 0; k < LANES; k++) {
-        const int i = k >> nodes->step_log2;
-        const float a = nodes->at[i][plane];
-        to[k] = a + nodes->part[k] * (nodes->at[i + 1][plane] - a);
+        for (int k = 0; k < step; k++)
+            to[i * step + k] = a + nodes->part[k] * d;
     }
 }
 
@@ -56,18 +52,18 @@ WEFT_INLINE void point_at_light(const weft_incidence *inc, int j, const float x[
     for (int k = 0; k < LANES; k++) {
         const float dx = far > 0 ? px : px - x[k], dy = far > 0 ? py : py - y[k], dz = far > 0 ? pz : pz - z;
         const float inverse = 1 / sqrtf(dx * dx + dy * dy + dz * dz);
-        s->light[0][j][k] = dx * inverse;
-        s->light[1][j][k] = dy * inverse;
-        s->light[2][j][k] = dz * inverse;
+        s->at[j].light[0][k] = dx * inverse;
+        s->at[j].light[1][k] = dy * inverse;
+        s->at[j].light[2][k] = dz * inverse;
     }
 }
 
-WEFT_INLINE void read_colours(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first,
-                              weft_solve_samples *s)
+WEFT_INLINE void read_colours(const block_nodes *nodes, int step_log2, int j, const weft_solve_row_in *in,
+                              int first, weft_solve_samples *s)
 {
     float scale[3][LANES];
     for (int c = 0; c < 3; c++)
-        expand(nodes, 2 + 3 * j + c, scale[c]);
+        expand(nodes, step_log2, 2 + 3 * j + c, scale[c]);
     const float *const red = in->rgb[0] + first, *const green = in->rgb[1] + first,
                        *const blue = in->rgb[2] + first;
 #pragma omp simd
@@ -76,29 +72,29 @@ WEFT_INLINE void read_colours(const block_nodes *nodes, int j, const weft_solve_
         const float rg = red[k] > green[k] ? red[k] : green[k], most = rg > blue[k] ? rg : blue[k];
         const int finite = fabsf(r) + fabsf(g) + fabsf(b) < 1e30F; /* false for NaN */
         const int use = finite & (most >= in->least);
-        s->weight[j][k] = use ? 1.0F : 0.0F;
-        s->value[0][j][k] = use ? r : 0.0F;
-        s->value[1][j][k] = use ? g : 0.0F;
-        s->value[2][j][k] = use ? b : 0.0F;
-        s->grey[j][k] = use ? 0.2126F * r + 0.7152F * g + 0.0722F * b : 0.0F;
+        s->at[j].weight[k] = use ? 1.0F : 0.0F;
+        s->at[j].value[0][k] = use ? r : 0.0F;
+        s->at[j].value[1][k] = use ? g : 0.0F;
+        s->at[j].value[2][k] = use ? b : 0.0F;
+        s->at[j].grey[k] = use ? 0.2126F * r + 0.7152F * g + 0.0722F * b : 0.0F;
     }
 }
 
 /* Sites of a mosaic: even columns have colour even, odd ones the other. */
-WEFT_INLINE void read_sites(const block_nodes *nodes, int j, const weft_solve_row_in *in, int first, int even,
-                            int odd, weft_solve_samples *s)
+WEFT_INLINE void read_sites(const block_nodes *nodes, int step_log2, int j, const weft_solve_row_in *in,
+                            int first, int even, int odd, weft_solve_samples *s)
 {
     float scale[2][LANES];
-    expand(nodes, 2 + 3 * j + even, scale[0]);
-    expand(nodes, 2 + 3 * j + odd, scale[1]);
+    expand(nodes, step_log2, 2 + 3 * j + even, scale[0]);
+    expand(nodes, step_log2, 2 + 3 * j + odd, scale[1]);
     const float *const site = in->rgb[0] + first;
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
         const float value = site[k] * (k & 1 ? scale[1][k] : scale[0][k]);
         const int use = (fabsf(value) < 1e30F) & (site[k] >= in->least);
-        s->weight[j][k] = use ? 1.0F : 0.0F;
-        s->value[0][j][k] = use ? value : 0.0F;
-        s->grey[j][k] = use ? value : 0.0F;
+        s->at[j].weight[k] = use ? 1.0F : 0.0F;
+        s->at[j].value[0][k] = use ? value : 0.0F;
+        s->at[j].grey[k] = use ? value : 0.0F;
     }
 }
 
@@ -106,13 +102,13 @@ WEFT_INLINE void leave_out(weft_solve_samples *s, int j, const int leave[LANES])
 {
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
-        s->weight[j][k] = leave[k] ? 0.0F : s->weight[j][k];
-        s->grey[j][k] = leave[k] ? 0.0F : s->grey[j][k];
+        s->at[j].weight[k] = leave[k] ? 0.0F : s->at[j].weight[k];
+        s->at[j].grey[k] = leave[k] ? 0.0F : s->at[j].grey[k];
     }
     for (int c = 0; c < s->n_channels; c++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++)
-            s->value[c][j][k] = leave[k] ? 0.0F : s->value[c][j][k];
+            s->at[j].value[c][k] = leave[k] ? 0.0F : s->at[j].value[c][k];
 }
 
 WEFT_INLINE void leave_out_clipped(const uint8_t *clipped, int j, weft_solve_samples *s)
@@ -131,12 +127,12 @@ WEFT_INLINE void leave_out_shadow(weft_solve_samples *s, float part)
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < LANES; k++)
-            limit[k] = s->grey[j][k] > limit[k] ? s->grey[j][k] : limit[k];
+            limit[k] = s->at[j].grey[k] > limit[k] ? s->at[j].grey[k] : limit[k];
     for (int j = 0; j < s->n_lights; j++) {
         int leave[LANES];
 #pragma omp simd
         for (int k = 0; k < LANES; k++)
-            leave[k] = s->grey[j][k] < part * limit[k];
+            leave[k] = s->at[j].grey[k] < part * limit[k];
         leave_out(s, j, leave);
     }
 }
@@ -160,30 +156,39 @@ WEFT_INLINE weft_solve_row_in copy_margin(const weft_solve_row_in *in, int first
     return (weft_solve_row_in){{m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least};
 }
 
-WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
-                               block_nodes *nodes, weft_solve_samples *s)
+WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, int row, int block,
+                                  const weft_solve_row_in *in, block_nodes *nodes, weft_solve_samples *s)
 {
     const weft_incidence *const inc = plan->incidence;
     const int first = block * LANES, n = plan->width - first < LANES ? plan->width - first : LANES;
     const int even = weft_cfa_colour(plan->cfa, 0, row), odd = weft_cfa_colour(plan->cfa, 1, row);
     float x[LANES], y[LANES];
-    interpolate_nodes(inc, row, block, nodes);
-    expand(nodes, 0, x);
-    expand(nodes, 1, y);
+    interpolate_nodes(inc, step_log2, row, block, nodes);
+    expand(nodes, step_log2, 0, x);
+    expand(nodes, step_log2, 1, y);
     for (int j = 0; j < inc->n_lights; j++) {
         margin m;
         const bool whole = n == LANES;
         const weft_solve_row_in source = whole ? in[j] : copy_margin(&in[j], first, n, &m);
         point_at_light(inc, j, x, y, s);
         if (plan->cfa == WEFT_CFA_NONE)
-            read_colours(nodes, j, &source, whole ? first : 0, s);
+            read_colours(nodes, step_log2, j, &source, whole ? first : 0, s);
         else
-            read_sites(nodes, j, &source, whole ? first : 0, even, odd, s);
+            read_sites(nodes, step_log2, j, &source, whole ? first : 0, even, odd, s);
         if (source.clipped)
             leave_out_clipped(source.clipped + (whole ? first : 0), j, s);
     }
     if (plan->shadow > 0)
         leave_out_shadow(s, plan->shadow);
+}
+
+WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
+                               block_nodes *nodes, weft_solve_samples *s)
+{
+    if (plan->incidence->step_log2 == 4)
+        gather_with_step(plan, 4, row, block, in, nodes, s);
+    else
+        gather_with_step(plan, plan->incidence->step_log2, row, block, in, nodes, s);
 }
 
 static void scatter(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out, int first,
@@ -206,11 +211,8 @@ void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_i
     block_nodes nodes;
     weft_solve_samples samples;
     weft_solve_answers answers;
-    nodes.step_log2 = plan->incidence->step_log2;
-    for (int k = 0; k < LANES; k++) {
-        const int inside = k & ((1 << nodes.step_log2) - 1);
-        nodes.part[k] = (float)inside / (float)(1 << nodes.step_log2);
-    }
+    for (int k = 0; k < LANES; k++)
+        nodes.part[k] = (float)k / (float)(1 << plan->incidence->step_log2);
     samples.n_lights = plan->incidence->n_lights;
     samples.n_channels = plan->cfa == WEFT_CFA_NONE ? 3 : 1;
     for (int first = 0; first < plan->width; first += LANES) {

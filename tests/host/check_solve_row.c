@@ -185,14 +185,15 @@ static void random_samples(weft_solve_samples *samples, uint64_t *random, double
             const bool use = weft_test_random(random) >= drop;
             double shade = (normal[0] * x + normal[1] * y + normal[2] * z) / length;
             shade = fmax(shade, 0) + 0.02 * weft_test_gauss(random);
-            samples->light[0][j][k] = (float)(x / length);
-            samples->light[1][j][k] = (float)(y / length);
-            samples->light[2][j][k] = (float)(z / length);
-            samples->weight[j][k] = use;
+            samples->at[j].light[0][k] = (float)(x / length);
+            samples->at[j].light[1][k] = (float)(y / length);
+            samples->at[j].light[2][k] = (float)(z / length);
+            samples->at[j].weight[k] = use;
             for (int c = 0; c < 3; c++)
-                samples->value[c][j][k] = (float)(use * (0.2 + 0.2 * c) * shade);
-            samples->grey[j][k] = 0.2126F * samples->value[0][j][k] + 0.7152F * samples->value[1][j][k] +
-                                  0.0722F * samples->value[2][j][k];
+                samples->at[j].value[c][k] = (float)(use * (0.2 + 0.2 * c) * shade);
+            samples->at[j].grey[k] = 0.2126F * samples->at[j].value[0][k] +
+                                     0.7152F * samples->at[j].value[1][k] +
+                                     0.0722F * samples->at[j].value[2][k];
         }
     }
 }
@@ -203,10 +204,10 @@ static int reference(const weft_solve_samples *samples, int k, double scaled[3],
     double a[N * 3], b[N], singular[3];
     int m = 0, rank;
     for (int j = 0; j < N; j++)
-        if (samples->weight[j][k] > 0) {
+        if (samples->at[j].weight[k] > 0) {
             for (int c = 0; c < 3; c++)
-                a[3 * m + c] = samples->light[c][j][k];
-            b[m++] = samples->grey[j][k];
+                a[3 * m + c] = samples->at[j].light[c][k];
+            b[m++] = samples->at[j].grey[k];
         }
     *least_singular = 0;
     if (m < 3)
@@ -266,11 +267,11 @@ static void test_shared_vectors(void **state)
         weft_solve_answers answers;
         for (int j = 0; j < N; j++) {
             for (int c = 0; c < 3; c++) {
-                samples.light[c][j][5] = (float)x[3 * j + c];
-                samples.value[c][j][5] = (float)(x[40 + j] / x[30 + j]);
+                samples.at[j].light[c][5] = (float)x[3 * j + c];
+                samples.at[j].value[c][5] = (float)(x[40 + j] / x[30 + j]);
             }
-            samples.weight[j][5] = 1;
-            samples.grey[j][5] = samples.value[0][j][5];
+            samples.at[j].weight[5] = 1;
+            samples.at[j].grey[5] = samples.at[j].value[0][5];
         }
         weft_solve_lsq(&samples, &answers);
         const double n[3] = {answers.normal[0][5], answers.normal[1][5], answers.normal[2][5]};
@@ -386,13 +387,13 @@ static void test_lights_in_one_plane_give_no_answer(void **state)
         for (int j = 0; j < 4; j++) {
             const double x = -0.6 + 0.4 * j, y = j == 3 ? 0.012 * k : 0, z = 0.8;
             const double length = sqrt(x * x + y * y + z * z);
-            samples.light[0][j][k] = (float)(x / length);
-            samples.light[1][j][k] = (float)(y / length);
-            samples.light[2][j][k] = (float)(z / length);
-            samples.weight[j][k] = 1;
+            samples.at[j].light[0][k] = (float)(x / length);
+            samples.at[j].light[1][k] = (float)(y / length);
+            samples.at[j].light[2][k] = (float)(z / length);
+            samples.at[j].weight[k] = 1;
             for (int c = 0; c < 3; c++)
-                samples.value[c][j][k] = (float)(z / length);
-            samples.grey[j][k] = (float)(z / length);
+                samples.at[j].value[c][k] = (float)(z / length);
+            samples.at[j].grey[k] = (float)(z / length);
         }
     weft_solve_lsq(&samples, &answers);
     for (int k = 0; k < LANES; k++) {
@@ -400,8 +401,8 @@ static void test_lights_in_one_plane_give_no_answer(void **state)
         int rank;
         for (int j = 0; j < 4; j++) {
             for (int c = 0; c < 3; c++)
-                a[3 * j + c] = samples.light[c][j][k];
-            b[j] = samples.grey[j][k];
+                a[3 * j + c] = samples.at[j].light[c][k];
+            b[j] = samples.at[j].grey[k];
         }
         assert_int_equal(LAPACKE_dgelsd(LAPACK_ROW_MAJOR, 4, 3, 1, a, 3, b, 1, values, 0, &rank), 0);
         singular = values[2];
