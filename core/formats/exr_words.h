@@ -4,7 +4,7 @@
 
 #include "core/error.h"
 
-#include <openexr.h>
+#include <OpenEXR/openexr.h>
 #include <stdatomic.h>
 
 /** The first failure of a file whose chunks are done on several threads; `{0}` is none. */

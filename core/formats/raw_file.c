@@ -178,7 +178,7 @@ static weft_err read_opened(libraw_data_t *raw, const char *path, const bool *da
                             weft_frame_info *info, weft_error *err)
 {
     weft_cfa cfa;
-    float black[4], white = 0;
+    float black[4] = {0}, white = 0;
     const int code = libraw_unpack(raw);
     if (code != LIBRAW_SUCCESS)
         return libraw_failed(path, code, err);

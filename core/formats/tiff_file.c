@@ -125,7 +125,8 @@ static weft_err read_picture(TIFF *tiff, const weft_tiff_log *log, uint64_t file
     tiff_layout l;
     weft_raster made;
     WEFT_TRY(read_layout(tiff, log, &l, err));
-    const double pixel_bytes = l.channels * (l.bits / 8), area = (double)l.block_width * l.block_height;
+    const int pixel_bytes = l.channels * (l.bits / 8);
+    const double area = (double)l.block_width * l.block_height;
     const double n_blocks = ceil((double)l.width / l.block_width) * ceil((double)l.height / l.block_height);
     if ((double)file_size < area * n_blocks * pixel_bytes / MAX_RATIO ||
         (double)file_size < 2 * n_blocks) /* each has an entry in a table of offsets */

@@ -120,7 +120,7 @@ static void convert_rows(void *context, int band, int row_begin, int row_end)
         const uint16_t *const dn = m->data + (size_t)v * (size_t)m->width;
         float *const out = weft_image_row(c->image, 0, v);
         uint8_t *const clip = c->saturated->data + (size_t)v * (size_t)m->width;
-        const float *const black = m->black + (v & 1) * 2, *const scale = c->scale + (v & 1) * 2;
+        const float *const black = &m->black[v & 1 ? 2 : 0], *const scale = &c->scale[v & 1 ? 2 : 0];
         for (int u = 0; u < m->width; u++) {
             const float value = (float)dn[u];
             out[u] = (value - black[u & 1]) * scale[u & 1];

@@ -70,7 +70,7 @@ static weft_err write_normal_png(const char *path, const weft_image *normal, wef
         const float *const plane = weft_image_plane(normal, p);
         for (size_t i = 0; i < n; i++) {
             const double code = 32767.5 + 32767.5 * fmin(fmax((double)plane[i], -1), 1);
-            raster.data[3 * i + (size_t)p] = isfinite(plane[i]) ? (uint16_t)(code + 0.5) : 32768;
+            raster.data[3 * i + (size_t)p] = isfinite(plane[i]) ? (uint16_t)lround(code) : 32768;
         }
     }
     const weft_err status = weft_png_write(path, &raster, err);
