@@ -221,7 +221,7 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
         session.cal.linearity = j.linearity;
         if (j.n_series) {
             session.cal.linearity.max_deviation = j.series.max_deviation;
-            session.cal.linearity.range[0] = fmin(j.linearity.range[0], j.series.range[0]);
+            session.cal.linearity.range[0] = fmax(fmin(j.linearity.range[0], j.series.range[0]), 0);
         }
         session.cal.has_linearity = true;
         status =
