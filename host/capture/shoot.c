@@ -43,7 +43,8 @@ static weft_err on_idle(void *context, weft_error *err)
 static weft_err settle(weft_shooter *s, weft_error *err)
 {
     const double end_s = weft_clock_s() + s->settle_s;
-    for (double left_s = s->settle_s; left_s > 0; left_s = end_s - weft_clock_s()) {
+    double left_s;
+    while ((left_s = end_s - weft_clock_s()) > 0) {
         const long ns = (long)(1e9 * fmin(left_s, 0.05));
         nanosleep(&(struct timespec){.tv_nsec = ns}, NULL);
         WEFT_TRY(on_idle(s, err));
