@@ -206,9 +206,6 @@ static weft_err fit(const weft_invocation *inv, const lights_args *args, const w
     if (status != WEFT_OK)
         return weft_prefix(err, status, "%s", set->folder);
     keep_measured_white(&former, cal);
-    for (int i = 0; i < report.n_rounds; i++)
-        weft_explain("round %d: moved by %.4f mm at most, measured/model differs by %.3f %% rms", i + 1,
-                     report.rounds[i].moved_mm, 100 * report.rounds[i].rms);
     if (!report.settled)
         weft_warn("the lights still moved by %.2f mm in the last round; the sheet may be uneven",
                   report.rounds[report.n_rounds - 1].moved_mm);
