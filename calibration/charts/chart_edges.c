@@ -123,7 +123,7 @@ weft_err weft_chart_edges_refine(const weft_chart *chart, const weft_image *cont
                                  int *n_edges, double *rms, weft_error *err)
 {
     weft_homography_sight *const sights = weft_alloc(SIGHTS_MAX, sizeof *sights, err);
-    double *const scratch = weft_alloc(2 * SIGHTS_MAX, sizeof *scratch, err);
+    double *const scratch = weft_alloc((size_t)2 * SIGHTS_MAX, sizeof *scratch, err);
     weft_err status = sights && scratch ? WEFT_OK : WEFT_ERR_NOMEM;
     *n_edges = 0;
     *rms = 0;

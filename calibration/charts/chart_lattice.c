@@ -119,17 +119,17 @@ static bool fit_map(const weft_blobs *blobs, const steps_here *first, weft_latti
 {
     weft_homography_sight sights[2 * WEFT_LATTICE_MAX];
     double scratch[4 * WEFT_LATTICE_MAX], rms;
+    int n = 0;
     for (int k = 0; k < lattice->n; k++) {
         const weft_lattice_node *const node = &lattice->nodes[k];
         const weft_blob *const b = &blobs->items[node->blob];
-        sights[2 * k] = (weft_homography_sight){node->i, node->j, b->u, b->v, 1, 0};
-        sights[2 * k + 1] = (weft_homography_sight){node->i, node->j, b->u, b->v, 0, 1};
+        sights[n++] = (weft_homography_sight){node->i, node->j, b->u, b->v, 1, 0};
+        sights[n++] = (weft_homography_sight){node->i, node->j, b->u, b->v, 0, 1};
     }
     const weft_blob *const seed = &blobs->items[lattice->nodes[0].blob];
     lattice->to_pixel = (weft_mat3){
         {first->right.u, first->down.u, seed->u, first->right.v, first->down.v, seed->v, 0, 0, 1}};
-    return weft_homography_refine(sights, 2 * lattice->n, true, scratch, &lattice->to_pixel, &rms, NULL) ==
-               WEFT_OK &&
+    return weft_homography_refine(sights, n, true, scratch, &lattice->to_pixel, &rms, NULL) == WEFT_OK &&
            rms < 0.1 * hypot(first->right.u, first->right.v);
 }
 

@@ -90,8 +90,8 @@ static void fit_channel(const weft_chart *chart, bool grey, comparison *k, int c
     }
     const double ridge = 1e-9 * (normal.m[0] + normal.m[4] + normal.m[8]);
     weft_vec3 mix = {right[1] / normal.m[4], 0, 0};
-    for (int i = 0; i < 3; i++)
-        normal.m[4 * i] += ridge;
+    for (int i = 0; i < 9; i += 4)
+        normal.m[i] += ridge;
     if (!grey && weft_mat3_invert(&normal, &inverse))
         mix = weft_mat3_apply(&inverse, (weft_vec3){right[0], right[1], right[2]});
     for (int p = 0; p < k->n; p++) {

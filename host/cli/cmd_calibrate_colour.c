@@ -101,9 +101,8 @@ static weft_err print(const weft_invocation *inv, const weft_chart_session *sess
             "held out      %5.2f  %5.2f\n",
             fit->before_mean, fit->before_max, fit->trained_mean, fit->trained_max, fit->held_out_mean,
             fit->held_out_max);
-    for (int i = 0; i < 3; i++)
-        fprintf(inv->out, "%9.5f %9.5f %9.5f\n", fit->to_linear_srgb.m[3 * i],
-                fit->to_linear_srgb.m[3 * i + 1], fit->to_linear_srgb.m[3 * i + 2]);
+    for (int i = 0; i < 9; i++)
+        fprintf(inv->out, "%9.5f%c", fit->to_linear_srgb.m[i], i % 3 == 2 ? '\n' : ' ');
     return WEFT_OK;
 }
 

@@ -109,8 +109,9 @@ static double pixel_value(const chart_scene *s, const weft_mat3 *back, int u, in
         return camera[colour];
     }
     for (int k = 0; k < N * N; k++) {
-        const double su = u + 2 * s->blur * ((k % N + 0.5) / N - 0.5),
-                     sv = v + 2 * s->blur * ((k / N + 0.5) / N - 0.5);
+        const int i = k % N, j = k / N;
+        const double su = u + 2 * s->blur * ((i + 0.5) / N - 0.5);
+        const double sv = v + 2 * s->blur * ((j + 0.5) / N - 0.5);
         region_colour(s, region_at(s, back, su, sv), su, sv, camera);
         sum += camera[colour];
     }

@@ -3,7 +3,7 @@
 
 #include "calibration/charts/chart.h"
 #include "core/linalg.h"
-#include "tests/calibration/spectra.h"
+#include "tests/calibration/spectral_tables.h"
 
 #include <stdio.h>
 #include <string.h>

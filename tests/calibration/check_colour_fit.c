@@ -4,7 +4,7 @@
 
 #include "calibration/charts/colour_fit.h"
 #include "core/colour.h"
-#include "tests/calibration/spectra.h"
+#include "tests/calibration/spectral_tables.h"
 
 #include <math.h>
 #include <string.h>

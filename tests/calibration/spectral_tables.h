@@ -1,8 +1,8 @@
 /**
  * Tables of numbers from CSV files and the spectral arithmetic that tests compare with.
  */
-#ifndef WEFT_TESTS_CALIBRATION_SPECTRA_H
-#define WEFT_TESTS_CALIBRATION_SPECTRA_H
+#ifndef WEFT_TESTS_CALIBRATION_SPECTRAL_TABLES_H
+#define WEFT_TESTS_CALIBRATION_SPECTRAL_TABLES_H
 
 #include <stddef.h>
 

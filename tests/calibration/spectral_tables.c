@@ -1,4 +1,4 @@
-#include "tests/calibration/spectra.h"
+#include "tests/calibration/spectral_tables.h"
 
 #include "tests/support/support.h"
 
