@@ -8,8 +8,8 @@
  * Demosaics plane 0 of maps->albedo, which holds the albedo of each site in its own colour, into all three.
  *
  * Albedo is white balanced and free of shading, so it is what a demosaicing filter expects; a photograph is
- * neither.  Sites without an answer are filled from their nearest neighbours of the same colour first;
- * a pixel whose filter still meets an empty site loses its answer in maps->mask.
+ * neither.  Sites without an answer are first filled from neighbours of the same colour, as far as the
+ * filters reach, so that a hole does not colour its rim; the mask stays as it is.
  */
 weft_err weft_site_albedo_finish(weft_maps *maps, weft_cfa cfa, weft_error *err);
 

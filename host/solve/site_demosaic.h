@@ -1,0 +1,22 @@
+/** Demosaicing along edges, for the albedo. */
+#ifndef WEFT_HOST_SOLVE_SITE_DEMOSAIC_H
+#define WEFT_HOST_SOLVE_SITE_DEMOSAIC_H
+
+#include "core/image.h"
+
+/**
+ * Three planes of a white-balanced mosaic by colour differences that are averaged along, not across, edges.
+ *
+ * Where dyed and undyed yarns meet, the filters of Malvar, He and Cutler mix the two materials and give
+ * colours that neither has; here each of the four directions counts by the inverse square of how much the
+ * difference of green and the site's colour changes along it.
+ * Source: Pekkucuksen and Altunbasak, "Gradient based threshold free color filter array interpolation",
+ * ICIP 2010, without its second pass over green.
+ *
+ * @param mosaic  one plane, at least 10 x 10 pixels, finite
+ * @param rgb     gets three planes of the same size; each site keeps its own value
+ * @return WEFT_ERR_RANGE for a smaller mosaic, WEFT_ERR_NOMEM
+ */
+weft_err weft_site_demosaic(const weft_image *mosaic, weft_cfa cfa, weft_image *rgb, weft_error *err);
+
+#endif
