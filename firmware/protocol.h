@@ -19,7 +19,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifndef WEFT_PROTOCOL_MAJOR /* a test builds firmware of another version */
+#ifndef WEFT_PROTOCOL_MAJOR   /* a test builds firmware of another version */
 #define WEFT_PROTOCOL_MAJOR 1 /* in every frame: the other side refuses another one */
 #endif
 #define WEFT_PROTOCOL_MINOR 0 /* appended fields and commands only */

@@ -1,6 +1,6 @@
 #include "shading/brdf/albedo.h"
 
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 #include "shading/brdf/quadrature.h"
 
 #include <assert.h>

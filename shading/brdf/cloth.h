@@ -3,7 +3,7 @@
 #define WEFT_SHADING_BRDF_CLOTH_H
 
 #include "shading/brdf/exp_negative.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 
 /**
  * The rim lobe, an inverted Gaussian: exp(-cot^2(theta_h)/alpha^2)/sin^4(theta_h).

@@ -2,7 +2,7 @@
 #ifndef WEFT_SHADING_BRDF_GGX_H
 #define WEFT_SHADING_BRDF_GGX_H
 
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 
 /**
  * GGX normal distribution, in 1/sr; the integral of D (n.h) over the hemisphere is 1.

@@ -1,10 +1,10 @@
 #include "shading/preview/preview.h"
 
-#include "shading/preview/samples.h"
+#include "shading/preview/preview_samples.h"
 
 #include "core/clones.h"
 #include "core/parallel.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
-#include "shading/preview/samples.h"
+#include "shading/preview/preview_samples.h"
 
 #include "core/clones.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 
 /* Folds a coordinate into 0..size-1 by mirroring at the edges of the texels (-0.5 and size - 0.5). */
 static inline double mirror(double t, double size, double *sign)

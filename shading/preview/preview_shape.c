@@ -1,7 +1,7 @@
-#include "shading/preview/samples.h"
+#include "shading/preview/preview_samples.h"
 
 #include "core/clones.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 
 #define SPHERE_SHARE      0.92 /* of the shorter side that the sphere's outline takes */
 #define MAX_SUPERSAMPLING 16

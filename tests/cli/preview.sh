@@ -114,6 +114,6 @@ expect 1 'absent.maps' "$weft" preview absent.maps -o x.png
 expect 1 'no/such/x.png' "$weft" preview weave.maps -o no/such/x.png
 printf 'not a picture' >broken.exr
 expect 1 'broken.exr' "$weft" preview weave.maps -o x.png --brdf ggx --param alpha=broken.exr
-head -c 2000 weave.maps/normal.exr >cut && cp -r weave.maps cut.maps && mv cut cut.maps/normal.exr
+cp -r weave.maps cut.maps && head -c 2000 weave.maps/normal.exr >cut.maps/normal.exr
 expect 1 'normal.exr' "$weft" preview cut.maps -o x.png
 [ ! -e x.png ] && [ -z "$(find . -name '.weft-*')" ]

