@@ -104,10 +104,12 @@ static const struct {
 #include "firmware/protocol.def"
 };
 
+enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
+
 void fw_command_run(weft_frame *frame)
 {
     uint8_t status = WEFT_STATUS_BAD_CMD, n = 0;
-    for (uint8_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+    for (int i = 0; i < N_COMMANDS; i++) {
         if (commands[i].opcode != frame->command)
             continue;
         status = WEFT_STATUS_BAD_ARG;

@@ -64,6 +64,7 @@ enum {
 #include "firmware/protocol.def"
 
 /* WEFT_HELLO_REQUEST_BYTES and so on: bytes on the wire, the status byte of a reply not counted */
+/* NOLINTBEGIN(bugprone-macro-parentheses): summands */
 enum {
 #define WEFT_PAYLOAD_BEGIN(name, NAME) WEFT_##NAME##_BYTES = 0
 #define WEFT_U8(field, text)           +1
@@ -73,6 +74,7 @@ enum {
 #define WEFT_PAYLOAD_END(name, NAME)   ,
 #include "firmware/protocol.def"
 };
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 /* void weft_hello_request_encode(const weft_hello_request *value, uint8_t bytes[WEFT_HELLO_REQUEST_BYTES]);
  * void weft_hello_request_decode(const uint8_t *bytes, uint8_t n, weft_hello_request *value);

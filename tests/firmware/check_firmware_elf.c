@@ -357,7 +357,8 @@ static void test_panic_bytes_in_mid_frame(void **state)
     const double sent_ms = now_ms();
     weft_controller_sim_run(sim, 1000);
     assert_int_equal(lights(), 0);
-    assert_true(off_at_ms() - sent_ms < (n / 2 + 4.5) * 0.022); /* with the third byte, not later */
+    const int sent = n / 2 + 3;
+    assert_true(off_at_ms() - sent_ms < (sent + 1.5) * 0.022); /* with the third byte, not later */
     do
         assert_true(next_frame(&event, 20));
     while (event.type != WEFT_FRAME_EVENT);

@@ -53,7 +53,7 @@ static bool next_frame(weft_frame *f)
 static int ask(uint8_t command, const void *payload, uint8_t n, weft_frame *reply)
 {
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
-    weft_frame f;
+    weft_frame f = {0};
     hear(wire, request(wire, command, payload, n));
     sim_board_turn();
     do /* replies to earlier requests may still be on their way */
@@ -244,7 +244,7 @@ static void test_a_burst_beyond_the_ring(void **state)
     (void)state;
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
     size_t n = 0;
-    while (n < 4 * FW_RX_RING) {
+    while (n < (size_t)4 * FW_RX_RING) {
         const uint8_t m = request(wire, WEFT_CMD_OFF, "", 0);
         hear(wire, m);
         n += m;
