@@ -17,7 +17,7 @@ typedef struct channel_names {
 static void name_channels(channel_names *channels, int n)
 {
     for (int i = 0; i < n; i++) {
-        snprintf(channels->text[i], sizeof channels->text[i], "light%02d.%c", i / 3, "RGB"[i % 3]);
+        snprintf(channels->text[i], sizeof channels->text[i], "light%02d.%c", (i / 3) & 0xff, "RGB"[i % 3]);
         channels->names[i] = channels->text[i];
     }
 }

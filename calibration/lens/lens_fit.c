@@ -45,7 +45,7 @@ static void fill_object(const weft_board *board, const double origin_mm[2], floa
 {
     for (int r = 0; r < board->rows; r++)
         for (int c = 0; c < board->columns; c++) {
-            float *const p = object + 3 * (r * board->columns + c);
+            float *const p = object + 3 * ((size_t)r * (size_t)board->columns + (size_t)c);
             p[0] = (float)(origin_mm[0] + board->square_mm * (c - 0.5 * (board->columns - 1)));
             p[1] = (float)(origin_mm[1] + board->square_mm * (0.5 * (board->rows - 1) - r));
             p[2] = 0;
@@ -188,7 +188,8 @@ static double coverage(const fit_work *work, const weft_board_view *views, int n
     int n = 0;
     for (int i = 0; i < n_views; i++)
         for (int p = 0; views[i].used && p < work->n_points; p++) {
-            const double u = (double)views[i].corners[2 * p], v = (double)views[i].corners[2 * p + 1];
+            const float *const corner = views[i].corners + 2 * (size_t)p;
+            const double u = (double)corner[0], v = (double)corner[1];
             const int c = (int)(u * COLUMNS / work->width), r = (int)(v * ROWS / work->height);
             if (u >= 0 && v >= 0 && c < COLUMNS && r < ROWS && !seen[r][c]) {
                 seen[r][c] = true;
@@ -247,17 +248,23 @@ weft_err weft_lens_fit(const weft_board *board, int width, int height, weft_boar
     return status;
 }
 
+/* Where the numbers of a corner begin in [rows][columns][2]. */
+static size_t corner_at(const weft_board *board, int row, int column)
+{
+    return 2 * ((size_t)row * (size_t)board->columns + (size_t)column);
+}
+
 /* Mean step in the picture from one corner to the next along a row, or across the rows. */
 static void mean_step(const weft_board *board, const float *corners, bool along, double step[2])
 {
     const int nc = board->columns - along, nr = board->rows - !along;
-    const int next = along ? 1 : board->columns;
+    const size_t next = along ? 2 : 2 * (size_t)board->columns;
     step[0] = step[1] = 0;
     for (int r = 0; r < nr; r++)
         for (int c = 0; c < nc; c++) {
-            const float *const p = corners + 2 * (r * board->columns + c);
-            step[0] += (double)(p[2 * next] - p[0]) / (nc * nr);
-            step[1] += (double)(p[2 * next + 1] - p[1]) / (nc * nr);
+            const float *const p = corners + corner_at(board, r, c), *const q = p + next;
+            step[0] += (double)(q[0] - p[0]) / (nc * nr);
+            step[1] += (double)(q[1] - p[1]) / (nc * nr);
         }
 }
 
@@ -284,8 +291,8 @@ static weft_err order_corners(const weft_board *board, const weft_board_view *vi
         for (int c = 0; c < board->columns; c++) {
             const int cc = right[0] < 0 ? board->columns - 1 - c : c;
             const int rr = down[1] < 0 ? board->rows - 1 - r : r;
-            const int from = swap ? cc * board->columns + rr : rr * board->columns + cc;
-            memcpy(ordered + 2 * (r * board->columns + c), view->corners + 2 * from, 2 * sizeof(float));
+            const size_t from = swap ? corner_at(board, cc, rr) : corner_at(board, rr, cc);
+            memcpy(ordered + corner_at(board, r, c), view->corners + from, 2 * sizeof(float));
         }
     return WEFT_OK;
 }
@@ -303,7 +310,7 @@ weft_err weft_lens_fit_pose(const weft_board *board, const weft_board_view *view
     float *const points = weft_alloc(5 * (size_t)n, sizeof *points, err);
     if (!points)
         return WEFT_ERR_NOMEM;
-    float *const object = points, *const image = points + 3 * n;
+    float *const object = points, *const image = points + 3 * (size_t)n;
     weft_err status = order_corners(board, view, image, err);
     if (status == WEFT_OK) {
         fill_object(board, origin_mm, object);

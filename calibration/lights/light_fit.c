@@ -222,11 +222,12 @@ static void fill_light(const fit_problem *f, int light, weft_light *out)
 static weft_err fill_result(const fit_problem *f, fit_planes *planes, weft_light *lights, float *gain,
                             weft_light_fit_report *report, weft_error *err)
 {
-    const int nodes = planes->smooth.columns * planes->smooth.rows;
+    const size_t nodes = (size_t)planes->smooth.columns * (size_t)planes->smooth.rows;
     for (int l = 0; l < f->n_lights; l++) {
         fill_light(f, l, &lights[l]);
         for (int c = 0; c < 3; c++)
-            WEFT_TRY(fit_grid(f, planes, l, c, gain + (3 * l + c) * nodes, &report->left_out[l], err));
+            WEFT_TRY(
+                fit_grid(f, planes, l, c, gain + (size_t)(3 * l + c) * nodes, &report->left_out[l], err));
         lights[l].residual = fit_grid_residual(f, planes, l, gain);
         report->model_rms[l] = model_rms(f, l);
     }

@@ -29,7 +29,7 @@ weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_white_s
     *p = (fit_planes){0};
     if (!(p->residual = weft_alloc((size_t)f->n_cells, sizeof(float), err)) ||
         !(p->weight = weft_alloc((size_t)f->n_cells, sizeof(float), err)) ||
-        !(p->nodes = weft_alloc((size_t)(columns * rows), sizeof(float), err)))
+        !(p->nodes = weft_alloc((size_t)columns * (size_t)rows, sizeof(float), err)))
         return WEFT_ERR_NOMEM;
     return fit_smooth_init(&p->smooth, sheet, columns, rows, err);
 }
@@ -125,7 +125,7 @@ weft_err fit_grid(const fit_problem *f, fit_planes *p, int light, int channel, f
 /* rms of measured/(model grid) - 1, dust left out. */
 double fit_grid_residual(const fit_problem *f, const fit_planes *p, int light, const float *gain)
 {
-    const int nodes = p->smooth.columns * p->smooth.rows;
+    const size_t nodes = (size_t)p->smooth.columns * (size_t)p->smooth.rows;
     const weft_white_sheet *const sheet = p->smooth.sheet;
     double sum = 0;
     long n = 0;
@@ -133,7 +133,7 @@ double fit_grid_residual(const fit_problem *f, const fit_planes *p, int light, c
         for (int i = 0; i < f->n_cells; i++) {
             const double bare =
                 fit_residual(f, light, c, i) + fit_common_log(&f->shared, f->place[i]) + f->common[i];
-            const double g = fit_smooth_at(&p->smooth, gain + (light * 3 + c) * nodes,
+            const double g = fit_smooth_at(&p->smooth, gain + (size_t)(light * 3 + c) * nodes,
                                            weft_white_sheet_centre(sheet, i % sheet->columns),
                                            weft_white_sheet_centre(sheet, i / sheet->columns));
             const double r = exp(bare) / g - 1;

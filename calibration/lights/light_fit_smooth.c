@@ -111,7 +111,7 @@ double fit_smooth_at(const fit_smooth *s, const float *nodes, double u, double v
     const double a = fmin(fmax(u / (s->sheet->width - 1), 0), 1) * (s->columns - 1);
     const double b = fmin(fmax(v / (s->sheet->height - 1), 0), 1) * (s->rows - 1);
     const int i = a < s->columns - 2 ? (int)a : s->columns - 2, j = b < s->rows - 2 ? (int)b : s->rows - 2;
-    const float *const p = nodes + j * s->columns + i, *const q = p + s->columns;
+    const float *const p = nodes + (size_t)j * (size_t)s->columns + i, *const q = p + s->columns;
     const double x = a - i, y = b - j;
     return (1 - y) * ((1 - x) * (double)p[0] + x * (double)p[1]) +
            y * ((1 - x) * (double)q[0] + x * (double)q[1]);

@@ -212,7 +212,7 @@ static void add_cell(normal *q, const int *at, const double *j, int n_j, int phi
 {
     double sum = 0, rest = 0;
     for (int c = 0; c < 3; c++) {
-        const size_t p = (size_t)(phi + c);
+        const size_t p = (size_t)phi + (size_t)c;
         q->h[p * (size_t)q->n + p] += w[c];
         q->g[p] += w[c] * r[c];
         for (int k = 0; k < n_j;
@@ -279,7 +279,7 @@ static void add_priors(const fit_problem *f, normal *q, const double *aim)
     for (int k = FIT_RADIAL; k < FIT_COMMON; k++)
         add_diagonal(q, shared + k, 1 / (SLOPE_SIGMA * SLOPE_SIGMA), -f->shared.v[k]);
     for (int k = 0; k < FIT_SHARED && !q->scope.shared_free; k++) {
-        const size_t at = (size_t)(shared + k);
+        const size_t at = (size_t)shared + (size_t)k;
         q->h[at * (size_t)q->n + at] = 1; /* held: its step is 0 */
         q->g[at] = 0;
     }
@@ -312,12 +312,12 @@ static double take_step(fit_problem *f, const normal *q)
     double moved = 0;
     for (int l = 0; l < q->scope.n; l++) {
         double *const lamp = f->lamps[q->scope.first + l].p; /* the numbers lie one after the other */
-        const double *const s = q->step + l * FIT_LAMP;
+        const double *const s = q->step + (size_t)l * FIT_LAMP;
         moved = fmax(moved, sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]));
         for (int k = 0; k < FIT_LAMP; k++)
             lamp[k] += s[k];
     }
-    const double *const s = q->step + q->scope.n * FIT_LAMP;
+    const double *const s = q->step + (size_t)q->scope.n * FIT_LAMP;
     for (int k = 0; k < FIT_COMMON; k++)
         f->shared.v[k] += s[k];
     f->shared.e0 += s[FIT_COMMON];

@@ -7,29 +7,28 @@
 
 /* Directions and distances of the search.  A lamp in the plane of the sheet or beyond the last distance is
  * reached by the refinement. */
-static const double azimuth_step_deg = 15, elevations_deg[] = {8, 15, 25, 35, 45, 55, 65, 75, 84, 89.9},
+static const double elevations_deg[] = {8, 15, 25, 35, 45, 55, 65, 75, 84, 89.9},
                     distances[] = {1.3, 1.9, 2.8, 4.2, 6.3, 9.5}; /* of the field's radius */
 #define N_ELEVATIONS (int)(sizeof elevations_deg / sizeof *elevations_deg)
+#define N_AZIMUTHS   24
 #define N_DISTANCES  (int)(sizeof distances / sizeof *distances)
 #define PI           3.14159265358979323846
 
 /* Every k-th cell of the problem, k by chance alike in both directions. */
 static weft_err thin_out(const fit_problem *f, fit_problem *coarse, weft_error *err)
 {
-    const int step = f->n_cells > COARSE_CELLS ? f->n_cells / COARSE_CELLS : 1;
-    const int n = (f->n_cells + step - 1) / step;
-    WEFT_TRY(fit_problem_init(coarse, f->n_lights, n, err));
+    const size_t step = f->n_cells > COARSE_CELLS ? (size_t)(f->n_cells / COARSE_CELLS) : 1;
+    const size_t n = ((size_t)f->n_cells + step - 1) / step;
+    WEFT_TRY(fit_problem_init(coarse, f->n_lights, (int)n, err));
     coarse->options = f->options;
     coarse->field_mm = f->field_mm;
-    for (int i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++) {
         coarse->x[i] = f->x[i * step];
         coarse->place[i] = f->place[i * step];
         for (int l = 0; l < f->n_lights; l++)
             for (int c = 0; c < 3; c++) {
-                coarse->y[fit_plane(coarse, l, c) + (size_t)i] =
-                    f->y[fit_plane(f, l, c) + (size_t)(i * step)];
-                coarse->weight[fit_plane(coarse, l, c) + (size_t)i] =
-                    f->weight[fit_plane(f, l, c) + (size_t)(i * step)];
+                coarse->y[fit_plane(coarse, l, c) + i] = f->y[fit_plane(f, l, c) + i * step];
+                coarse->weight[fit_plane(coarse, l, c) + i] = f->weight[fit_plane(f, l, c) + i * step];
             }
     }
     return WEFT_OK;
@@ -82,11 +81,11 @@ static void search(const fit_problem *f, int light, candidate best[N_BEST])
         best[i] = (candidate){.cost = HUGE_VAL};
     for (int d = 0; d < N_DISTANCES; d++)
         for (int e = 0; e < N_ELEVATIONS; e++)
-            for (double a = 0; a < 360; a += azimuth_step_deg) {
-                const double r = distances[d] * f->field_mm, el = elevations_deg[e] * PI / 180;
-                candidate one = {.lamp = {.p = {r * cos(el) * cos(a * PI / 180),
-                                                r * cos(el) * sin(a * PI / 180), r * sin(el)},
-                                          .e = 1}};
+            for (int k = 0; k < N_AZIMUTHS; k++) {
+                const double r = distances[d] * f->field_mm, el = elevations_deg[e] * PI / 180,
+                             a = k * 2 * PI / N_AZIMUTHS;
+                candidate one = {
+                    .lamp = {.p = {r * cos(el) * cos(a), r * cos(el) * sin(a), r * sin(el)}, .e = 1}};
                 one.cost = level(f, light, &one.lamp);
                 keep_best(best, one);
             }

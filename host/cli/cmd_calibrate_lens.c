@@ -252,7 +252,7 @@ static weft_err check_args(const weft_invocation *inv, const lens_run *run, weft
 
 static weft_err alloc_run(lens_run *run, int n, weft_error *err)
 {
-    const size_t corners = (size_t)(run->board.columns * run->board.rows);
+    const size_t corners = (size_t)run->board.columns * (size_t)run->board.rows;
     run->views = weft_alloc((size_t)n, sizeof *run->views, err);
     run->corners = weft_alloc(2 * corners * (size_t)(n + 1), sizeof *run->corners, err);
     run->without_board = json_array();

@@ -232,6 +232,38 @@ static void test_a_grid_that_does_not_fit_is_refused(void **state)
     weft_calibration_fini(&cal);
 }
 
+/* Every allocation of a load and of a save fails in turn: one error, nothing leaked, nothing half done. */
+static void test_running_out_of_memory(void **state)
+{
+    (void)state;
+    const char *const folder = weft_test_path("oom.cal");
+    weft_calibration cal = whole_calibration(), back;
+    weft_error error;
+    add_grid(&cal, 1);
+    assert_ok(weft_calibration_save(folder, &cal, err));
+    long n = 0;
+    for (weft_err status = WEFT_ERR_NOMEM; status != WEFT_OK; n++) {
+        error = (weft_error){0};
+        weft_mem_fail_after(n);
+        status = weft_calibration_load(folder, &back, &error);
+        weft_mem_fail_after(-1);
+        assert_true(status == WEFT_OK || (status == WEFT_ERR_NOMEM && error.text[0]));
+    }
+    assert_true(n > 3);
+    weft_calibration_fini(&back);
+    n = 0;
+    for (weft_err status = WEFT_ERR_NOMEM; status != WEFT_OK; n++) {
+        cal.grid.gain[0] += 1; /* so that there is a grid to write */
+        weft_mem_fail_after(n);
+        status = weft_calibration_save(folder, &cal, &error);
+        weft_mem_fail_after(-1);
+        assert_ok(weft_calibration_load(folder, &back, err)); /* the old or the new one */
+        weft_calibration_fini(&back);
+        assert_true(n < 200);
+    }
+    weft_calibration_fini(&cal);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -241,6 +273,7 @@ int main(void)
         cmocka_unit_test(test_numbers_that_are_none_are_not_written),
         cmocka_unit_test(test_bad_files_are_refused_by_name),
         cmocka_unit_test(test_a_grid_that_does_not_fit_is_refused),
+        cmocka_unit_test(test_running_out_of_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
