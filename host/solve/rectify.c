@@ -153,6 +153,17 @@ static float filter(const weft_image *image, int plane, const taps *x, const tap
     return sum;
 }
 
+/* Keeps a filtered value within those of the nearest four: the kernel's lobes would ring where a dark yarn
+ * meets a light one, down to below black. */
+static float within_nearest(const weft_image *image, int plane, int u0, int v0, float value)
+{
+    const float *const top = weft_image_row(image, plane, v0) + u0;
+    const float *const bottom = weft_image_row(image, plane, v0 + 1) + u0;
+    const float least = fminf(fminf(top[0], top[1]), fminf(bottom[0], bottom[1]));
+    const float most = fmaxf(fmaxf(top[0], top[1]), fmaxf(bottom[0], bottom[1]));
+    return fminf(fmaxf(value, least), most);
+}
+
 /* Linear weights of the nearest four that have an answer; false when the nearest one has none. */
 static bool near_weights(const weft_mask *mask, double u, double v, int *u0, int *v0, float weight[4])
 {
@@ -201,6 +212,8 @@ static bool resample(const rectify_job *job, double u, double v, float normal_al
         const weft_image *const image = p < 3 ? &s->normal : &s->albedo;
         normal_albedo[p] = whole ? filter(image, p % 3, &x, &y) : near_value(image, p % 3, u0, v0, near);
     }
+    for (int p = 3; p < PLANES && whole && job->widen <= 1; p++)
+        normal_albedo[p] = within_nearest(&s->albedo, p - 3, u0, v0, normal_albedo[p]);
     float *const n = normal_albedo;
     const float length = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     if (!(length > 0))

@@ -6,7 +6,10 @@
 #include <string.h>
 
 /* Pixels around the picture, mirrored so that parity and colour are kept. */
-enum { PAD = 8, REACH = 4, LEAST = PAD + 2 };
+enum { PAD = 8, REACH = 4, AROUND = 2, LEAST = PAD + 2 };
+
+/* Greens that differ by less than this part of their sum count as alike: a few times the noise. */
+static const float alike = 0.05F;
 
 typedef struct demosaic_job {
     const weft_image *mosaic;
@@ -16,7 +19,7 @@ typedef struct demosaic_job {
      * takes the other colour from its neighbours, the other's site green. */
     weft_image along; /* 2 planes: rows, columns */
     weft_image turn;  /* 2 planes: how much `along` changes from the neighbour before to the one after */
-    weft_image green; /* 1 plane: green minus the site's own colour, final; 0 at green sites */
+    weft_image green; /* 1 plane: green everywhere */
     weft_image *rgb;
 } demosaic_job;
 
@@ -112,32 +115,36 @@ static void green_rows(void *context, int band, int row_begin, int row_end)
     (void)band;
     for (int v = row_begin; v < row_end; v++)
         for (int u = 0; u < m->width; u++) {
-            if (is_green(job, u, v))
-                continue;
+            const float own = weft_image_row(m, 0, v)[u];
             float sum = 0, weight = 0;
-            look(&job->along, &job->turn, 0, u + PAD, v + PAD, 1, 0, &sum, &weight);
-            look(&job->along, &job->turn, 0, u + PAD, v + PAD, -1, 0, &sum, &weight);
-            look(&job->along, &job->turn, 1, u + PAD, v + PAD, 0, 1, &sum, &weight);
-            look(&job->along, &job->turn, 1, u + PAD, v + PAD, 0, -1, &sum, &weight);
-            weft_image_row(&job->green, 0, v)[u] = sum / weight;
+            if (!is_green(job, u, v)) {
+                look(&job->along, &job->turn, 0, u + PAD, v + PAD, 1, 0, &sum, &weight);
+                look(&job->along, &job->turn, 0, u + PAD, v + PAD, -1, 0, &sum, &weight);
+                look(&job->along, &job->turn, 1, u + PAD, v + PAD, 0, 1, &sum, &weight);
+                look(&job->along, &job->turn, 1, u + PAD, v + PAD, 0, -1, &sum, &weight);
+            }
+            weft_image_row(&job->green, 0, v)[u] = weight > 0 ? own + sum / weight : own;
         }
 }
 
-/* Mean of the final difference over the neighbours that have a colour. */
+/* Green minus a colour at (u, v): mean over the sites of that colour near by, those of like green first. */
 static float difference_of(const demosaic_job *job, int colour, int u, int v)
 {
     const weft_image *const m = job->mosaic;
-    float sum = 0;
-    int n = 0;
-    for (int dv = -1; dv <= 1; dv++)
-        for (int du = -1; du <= 1; du++) {
+    const float here = weft_image_row(&job->green, 0, v)[u];
+    float sum = 0, sum_weight = 0;
+    for (int dv = -AROUND; dv <= AROUND; dv++)
+        for (int du = -AROUND; du <= AROUND; du++) {
             const int x = mirror(u + du, m->width), y = mirror(v + dv, m->height);
             if (weft_cfa_colour(job->cfa, x, y) != colour)
                 continue;
-            sum += weft_image_row(&job->green, 0, y)[x];
-            n++;
+            const float green = weft_image_row(&job->green, 0, y)[x];
+            const float apart = green - here, near = alike * (fabsf(green) + fabsf(here)) + 1e-3F;
+            const float weight = 1 / ((apart * apart + near * near) * (float)(1 + du * du + dv * dv));
+            sum += weight * (green - weft_image_row(m, 0, y)[x]);
+            sum_weight += weight;
         }
-    return sum / (float)n;
+    return sum / sum_weight;
 }
 
 static void colour_rows(void *context, int band, int row_begin, int row_end)
@@ -148,8 +155,7 @@ static void colour_rows(void *context, int band, int row_begin, int row_end)
     for (int v = row_begin; v < row_end; v++)
         for (int u = 0; u < m->width; u++) {
             const int own = weft_cfa_colour(job->cfa, u, v);
-            const float value = weft_image_row(m, 0, v)[u];
-            const float green = own == 1 ? value : value + weft_image_row(&job->green, 0, v)[u];
+            const float value = weft_image_row(m, 0, v)[u], green = weft_image_row(&job->green, 0, v)[u];
             for (int c = 0; c < 3; c += 2)
                 weft_image_row(job->rgb, c, v)[u] = c == own ? value : green - difference_of(job, c, u, v);
             weft_image_row(job->rgb, 1, v)[u] = green;

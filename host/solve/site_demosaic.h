@@ -8,10 +8,11 @@
  * Three planes of a white-balanced mosaic by colour differences that are averaged along, not across, edges.
  *
  * Where dyed and undyed yarns meet, the filters of Malvar, He and Cutler mix the two materials and give
- * colours that neither has; here each of the four directions counts by the inverse square of how much the
- * difference of green and the site's colour changes along it.
- * Source: Pekkucuksen and Altunbasak, "Gradient based threshold free color filter array interpolation",
- * ICIP 2010, without its second pass over green.
+ * colours that neither has.  Green comes from four directions, each counting by the inverse square of how
+ * much the difference of green and the site's colour changes along it (Pekkucuksen and Altunbasak, "Gradient
+ * based threshold free color filter array interpolation", ICIP 2010, without its second pass).  Red and blue
+ * come from the differences of the sites within two pixels, those whose green is alike counting most: a
+ * neighbour of another material has another green.
  *
  * @param mosaic  one plane, at least 10 x 10 pixels, finite
  * @param rgb     gets three planes of the same size; each site keeps its own value
