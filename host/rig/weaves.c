@@ -1,11 +1,11 @@
 /* The fabrics of the virtual scanner. */
 #include "host/rig/cloth.h"
 
-/* Matte cotton: a weak, broad sheen.  The fibre's index 1.55 gives 4.6 % at normal incidence; fuzz hides
- * half. */
+/* Matte cotton: a weak, broad sheen.  The fibre's index 1.55 gives 4.6 % at normal incidence.  Measured
+   reflectances hold already what the fuzz scatters of it to all sides; the sheen is only the rest. */
 #define COTTON                                                                                               \
     {                                                                                                        \
-        .f0 = 0.046F, .coverage = 0.5F, .alpha_along = 0.55F, .alpha_across = 0.75F                          \
+        .f0 = 0.046F, .coverage = 0.15F, .alpha_along = 0.45F, .alpha_across = 0.7F                          \
     }
 
 const weft_weave weft_weaves[] = {
