@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 
 typedef struct weft_vec3 {
     double x, y, z;
@@ -72,8 +73,8 @@ static inline weft_mat3 weft_mat3_transpose(const weft_mat3 *a)
 static inline weft_mat3 weft_mat3_multiply(const weft_mat3 *a, const weft_mat3 *b)
 {
     weft_mat3 c;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
+    for (size_t i = 0; i < 3; i++)
+        for (size_t j = 0; j < 3; j++)
             c.m[3 * i + j] =
                 a->m[3 * i] * b->m[j] + a->m[3 * i + 1] * b->m[3 + j] + a->m[3 * i + 2] * b->m[6 + j];
     return c;

@@ -79,7 +79,8 @@ static void compare_projection(const weft_camera *a, const weft_camera *b, weft_
 {
     int n = 0;
     for (int i = 0; i < 81; i++) {
-        const double u = (a->width - 1) * (i % 9) / 8.0, v = (a->height - 1) * (i / 9) / 8.0;
+        const int column = i % 9, row = i / 9;
+        const double u = (a->width - 1) * column / 8.0, v = (a->height - 1) * row / 8.0;
         weft_vec3 point;
         double x, y;
         if (!weft_camera_to_plane(a, u, v, 0, &point) || !weft_camera_project(b, point, &x, &y))

@@ -51,7 +51,7 @@ static void extrapolate(const lattice *l, double i, double j, float *planes)
     evaluate(l, edge_i, edge_j, planes);
     if (edge_i == i && edge_j == j)
         return;
-    float inner[WEFT_INCIDENCE_PLANES(WEFT_LIGHTS_MAX)];
+    float inner[WEFT_INCIDENCE_PLANES(WEFT_LIGHTS_MAX)] = {0};
     evaluate(l, inner_i, inner_j, inner);
     const double reach = hypot(edge_i - inner_i, edge_j - inner_j), past = hypot(i - edge_i, j - edge_j);
     const float t = reach > 0 ? (float)(past / reach) : 0;

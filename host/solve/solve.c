@@ -66,11 +66,11 @@ typedef struct solve_job {
 static void apply_matrix(const weft_mat3 *matrix, float *const rgb[3], int width)
 {
     float m[9];
-    for (int i = 0; i < 9; i++)
+    for (size_t i = 0; i < 9; i++)
         m[i] = (float)matrix->m[i];
     for (int i = 0; i < width; i++) {
         const float r = rgb[0][i], g = rgb[1][i], b = rgb[2][i];
-        for (int c = 0; c < 3; c++)
+        for (size_t c = 0; c < 3; c++)
             rgb[c][i] = m[3 * c] * r + m[3 * c + 1] * g + m[3 * c + 2] * b;
     }
 }
@@ -139,7 +139,7 @@ static weft_err halve_mask(weft_mask *mask, weft_error *err)
     WEFT_TRY(weft_mask_init(&half, mask->width / 2, mask->height / 2, 0, err));
     for (int j = 0; j < half.height; j++)
         for (int i = 0; i < half.width; i++) {
-            const uint8_t *const a = mask->data + (size_t)(2 * j) * (size_t)mask->width + 2 * i;
+            const uint8_t *const a = mask->data + (size_t)(2 * j) * (size_t)mask->width + (size_t)(2 * i);
             const uint8_t *const b = a + mask->width;
             half.data[(size_t)j * (size_t)half.width + (size_t)i] = a[0] && a[1] && b[0] && b[1] ? 255 : 0;
         }

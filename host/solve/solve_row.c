@@ -162,7 +162,7 @@ WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, in
     const weft_incidence *const inc = plan->incidence;
     const int first = block * LANES, n = plan->width - first < LANES ? plan->width - first : LANES;
     const int even = weft_cfa_colour(plan->cfa, 0, row), odd = weft_cfa_colour(plan->cfa, 1, row);
-    float x[LANES], y[LANES];
+    float x[LANES] = {0}, y[LANES] = {0};
     interpolate_nodes(inc, step_log2, row, block, nodes);
     expand(nodes, step_log2, 0, x);
     expand(nodes, step_log2, 1, y);
@@ -208,7 +208,7 @@ static void scatter(const weft_solve_answers *a, int n_channels, const weft_solv
 void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,
                     const weft_solve_row_out *out)
 {
-    block_nodes nodes;
+    block_nodes nodes = {0};
     weft_solve_samples samples;
     weft_solve_answers answers;
     for (int k = 0; k < LANES; k++)
