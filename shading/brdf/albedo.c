@@ -65,16 +65,31 @@ static void add_arc(integral *in, double theta, double begin, double end, double
             in->sum[c] += w[i] > 0 ? w[i] * value[c][i] : 0;
 }
 
+/* The next azimuth (from that of the view) above `from` where an anisotropic lobe may have a ridge, and
+ * around it at some decades of the ridge's width: nodes crowd at the ends of an interval, but not enough for
+ * widths a factor 1e5 apart. */
+static double next_cut(const integral *in, double from)
+{
+    static const double around[] = {-3e-2, -1e-3, -3e-5, 0, 3e-5, 1e-3, 3e-2};
+    const double quarter = WEFT_PI / 2, nearest = floor((in->phi_rad + from) / quarter + 0.5);
+    for (int side = 0; side < 2; side++)
+        for (size_t i = 0; i < sizeof around / sizeof around[0]; i++) {
+            const double cut = (nearest + side) * quarter + around[i] - in->phi_rad;
+            if (cut > from + 1e-9)
+                return cut;
+        }
+    return from + quarter;
+}
+
 /* Both arcs begin..end beside the view's azimuth; those of anisotropic models are cut at tangent and
- * bitangent, where a lobe can be as narrow as it likes, for the nodes crowd at the ends. */
+ * bitangent, where a lobe can be as narrow as it likes. */
 static void add_arcs(integral *in, double theta, double begin, double end, double weight)
 {
-    const double quarter = WEFT_PI / 2;
     for (int side = -1; side <= 1; side += 2) {
         double from = side < 0 ? -end : begin;
         const double to = side < 0 ? -begin : end;
         while (in->anisotropic) {
-            const double cut = (floor((in->phi_rad + from) / quarter + 1e-9) + 1) * quarter - in->phi_rad;
+            const double cut = next_cut(in, from);
             if (cut >= to)
                 break;
             add_arc(in, theta, from, cut, weight);

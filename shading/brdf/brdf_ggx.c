@@ -36,45 +36,25 @@ static void eval(const weft_brdf_batch *b, double *const value[3])
     }
 }
 
-/* Share of samples for the specular lobe: its part of the light that would be reflected, never below a
- * tenth of either lobe, so that neither starves. */
+/* Share of samples for the specular lobe: its part of the light that would be reflected. */
 static double specular_share(const weft_brdf_batch *b, int i)
 {
     const double f0 = (b->param[F0][i] + b->param[F0 + 1][i] + b->param[F0 + 2][i]) / 3;
     const double albedo = (b->param[ALBEDO][i] + b->param[ALBEDO + 1][i] + b->param[ALBEDO + 2][i]) / 3;
     const double specular = weft_fresnel_schlick(f0, weft_max(b->view[2][i], 0));
-    const double diffuse = (1 - specular) * albedo;
-    const double share = specular + diffuse > 0 ? specular / (specular + diffuse) : 0.5;
-    return share < 0.1 ? 0.1 : share > 0.9 ? 0.9 : share;
+    return weft_sample_share(specular, (1 - specular) * albedo);
 }
 
 static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
 {
-    for (int i = 0; i < b->n; i++) {
-        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, alpha = b->param[ALPHA][i];
-        double h[3], l[3];
-        if (u[0][i] < specular_share(b, i)) {
-            weft_sample_ggx_visible(v, alpha, alpha, u[1][i], u[2][i], h);
-            weft_reflect(v, h, l);
-        } else {
-            weft_sample_cosine(u[1][i], u[2][i], l);
-        }
-        for (int c = 0; c < 3; c++)
-            light[c][i] = l[c];
-    }
+    for (int i = 0; i < b->n; i++)
+        weft_sample_mixed(b, i, specular_share(b, i), b->param[ALPHA][i], b->param[ALPHA][i], u, light);
 }
 
 static void pdf(const weft_brdf_batch *b, double *density)
 {
-    for (int i = 0; i < b->n; i++) {
-        const double vz = b->view[2][i], alpha = b->param[ALPHA][i], share = specular_share(b, i);
-        const weft_half h =
-            weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i], b->view[1][i], vz);
-        const double specular =
-            h.up * weft_pdf_ggx_visible(weft_ggx_d(h.nh, h.s2, alpha), weft_ggx_v1(vz, alpha), vz);
-        const double diffuse = vz > 0 ? weft_pdf_cosine(b->light[2][i]) : 0;
-        density[i] = share * specular + (1 - share) * diffuse;
-    }
+    for (int i = 0; i < b->n; i++)
+        density[i] = weft_pdf_mixed(b, i, specular_share(b, i), b->param[ALPHA][i], b->param[ALPHA][i]);
 }
 
 /* Not passive: at grazing views of smooth surfaces diffuse and specular add up to as much as 1.70 (alpha

@@ -40,29 +40,21 @@ static void eval(const weft_brdf_batch *b, double *const value[3])
     }
 }
 
+static double bitangent_width(const weft_brdf_batch *b, int i)
+{
+    return weft_ggx_alpha_b(b->param[ALPHA][i], b->param[ANISOTROPY][i], ALPHA_FLOOR);
+}
+
 static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
 {
-    for (int i = 0; i < b->n; i++) {
-        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, at = b->param[ALPHA][i];
-        double h[3], l[3];
-        weft_sample_ggx_visible(v, at, weft_ggx_alpha_b(at, b->param[ANISOTROPY][i], ALPHA_FLOOR), u[1][i],
-                                u[2][i], h);
-        weft_reflect(v, h, l);
-        for (int c = 0; c < 3; c++)
-            light[c][i] = l[c];
-    }
+    for (int i = 0; i < b->n; i++)
+        weft_sample_mixed(b, i, 1, b->param[ALPHA][i], bitangent_width(b, i), u, light);
 }
 
 static void pdf(const weft_brdf_batch *b, double *density)
 {
-    for (int i = 0; i < b->n; i++) {
-        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, at = b->param[ALPHA][i];
-        const double ab = weft_ggx_alpha_b(at, b->param[ANISOTROPY][i], ALPHA_FLOOR);
-        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], v[0], v[1], v[2]);
-        density[i] = h.up > 0 ? weft_pdf_ggx_visible(weft_ggx_d_aniso(h.h[0], h.h[1], h.nh, at, ab),
-                                                     weft_ggx_v1_aniso(v[0], v[1], v[2], at, ab), v[2])
-                              : 0;
-    }
+    for (int i = 0; i < b->n; i++)
+        density[i] = weft_pdf_mixed(b, i, 1, b->param[ALPHA][i], bitangent_width(b, i));
 }
 
 const weft_brdf weft_brdf_ggx_aniso = {

@@ -39,24 +39,14 @@ static void eval(const weft_brdf_batch *b, double *const value[3])
 
 static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
 {
-    for (int i = 0; i < b->n; i++) {
-        const double v[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, alpha = b->param[3][i];
-        double h[3], l[3];
-        weft_sample_ggx_visible(v, alpha, alpha, u[1][i], u[2][i], h);
-        weft_reflect(v, h, l);
-        for (int c = 0; c < 3; c++)
-            light[c][i] = l[c];
-    }
+    for (int i = 0; i < b->n; i++)
+        weft_sample_mixed(b, i, 1, b->param[3][i], b->param[3][i], u, light);
 }
 
 static void pdf(const weft_brdf_batch *b, double *density)
 {
-    for (int i = 0; i < b->n; i++) {
-        const double vz = b->view[2][i], alpha = b->param[3][i];
-        const weft_half h =
-            weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i], b->view[1][i], vz);
-        density[i] = h.up * weft_pdf_ggx_visible(weft_ggx_d(h.nh, h.s2, alpha), weft_ggx_v1(vz, alpha), vz);
-    }
+    for (int i = 0; i < b->n; i++)
+        density[i] = weft_pdf_mixed(b, i, 1, b->param[3][i], b->param[3][i]);
 }
 
 const weft_brdf weft_brdf_ggx_specular = {

@@ -19,6 +19,19 @@ static inline double weft_cloth_rim(double nh, double s2, double alpha)
 }
 
 /**
+ * Cloth distribution with a tint for each of its two parts, in 1/sr:
+ *
+ *     D_2 = (front + tint A rim) / (pi (1 + A alpha^2))
+ *
+ * @param rim  weft_cloth_rim().  Source: S-ORD-16 (the seed shows two tones and gives no formula).
+ */
+static inline double weft_cloth_d_tinted(double rim, double front, double tint, double alpha,
+                                         double amplitude)
+{
+    return (front + tint * amplitude * rim) / (WEFT_PI * (1 + amplitude * alpha * alpha));
+}
+
+/**
  * Cloth distribution, in 1/sr; the integral of D (n.h) over the hemisphere is 1.
  *
  *     D = (1 + A rim) / (pi (1 + A alpha^2))
@@ -28,7 +41,7 @@ static inline double weft_cloth_rim(double nh, double s2, double alpha)
  */
 static inline double weft_cloth_d(double nh, double s2, double alpha, double amplitude)
 {
-    return (1 + amplitude * weft_cloth_rim(nh, s2, alpha)) / (WEFT_PI * (1 + amplitude * alpha * alpha));
+    return weft_cloth_d_tinted(weft_cloth_rim(nh, s2, alpha), 1, 1, alpha, amplitude);
 }
 
 /** 1/(4 (nl + nv - nl nv)) in place of G/(4 nl nv): no shadowing term.  nl, nv > 0.  Source: S-ORD-15. */

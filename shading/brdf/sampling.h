@@ -58,6 +58,20 @@ static inline double weft_pdf_ggx_visible(double d, double v1_view, double nv)
     return nv > 0 ? 0.5 * d * v1_view : 0;
 }
 
+/**
+ * Draws light direction i of a batch: with probability `share` the reflection at a visible normal of GGX
+ * (widths at, ab), else the cosine hemisphere.  u [3][n] as weft_brdf.sample takes it.
+ */
+void weft_sample_mixed(const weft_brdf_batch *batch, int i, double share, double at, double ab,
+                       const double *const u[3], double *const light[3]);
+
+/** Its density at light direction i, in 1/sr; 0 where n.v <= 0. */
+double weft_pdf_mixed(const weft_brdf_batch *batch, int i, double share, double at, double ab);
+
+/** A share for the lobe of a material with diffuse and specular light of these sizes: never below a tenth of
+ *  either, so that neither starves; the half of both where there is no light at all. */
+double weft_sample_share(double specular, double diffuse);
+
 /** weft_brdf.sample and .pdf of models without a sharp lobe: the cosine hemisphere. */
 void weft_brdf_sample_cosine(const weft_brdf_batch *batch, const double *const u[3], double *const light[3]);
 void weft_brdf_pdf_cosine(const weft_brdf_batch *batch, double *density);

@@ -9,9 +9,13 @@
 
 const weft_vectors_model *weft_vectors_find(const char *stem)
 {
-    for (const weft_vectors_model *m = weft_vectors_models; m->stem; m++)
-        if (strcmp(m->stem, stem) == 0)
-            return m;
+    static const weft_vectors_model *const subjects[] = {weft_vectors_reflectance,
+                                                         weft_vectors_more_reflectance, weft_vectors_lighting,
+                                                         weft_vectors_bake, weft_vectors_skin};
+    for (size_t i = 0; i < sizeof subjects / sizeof subjects[0]; i++)
+        for (const weft_vectors_model *m = subjects[i]; m->stem; m++)
+            if (strcmp(m->stem, stem) == 0)
+                return m;
     return NULL;
 }
 

@@ -1,7 +1,7 @@
 /**
  * The functions of this folder behind the names of the tables of reference values (NAME.csv, with columns
  * of inputs and columns out_*).  build/bin/weft-vectors runs them against the tables; a new function is one
- * row in vectors_table.c.
+ * row in a file vectors_SUBJECT.c.
  */
 #ifndef WEFT_SHADING_VECTORS_VECTORS_H
 #define WEFT_SHADING_VECTORS_VECTORS_H
@@ -23,8 +23,12 @@ typedef struct weft_vectors_model {
     void (*eval)(int n, const double *const *in /* [n_in][n] */, double *const *out /* [n_out][n] */);
 } weft_vectors_model;
 
-/** All, by stem; ends with {0}. */
-extern const weft_vectors_model weft_vectors_models[];
+/** The tables by subject, one file each; each ends with {0}. */
+extern const weft_vectors_model weft_vectors_reflectance[];
+extern const weft_vectors_model weft_vectors_more_reflectance[];
+extern const weft_vectors_model weft_vectors_lighting[];
+extern const weft_vectors_model weft_vectors_bake[];
+extern const weft_vectors_model weft_vectors_skin[];
 
 /** The model of a stem; NULL when this build has none. */
 const weft_vectors_model *weft_vectors_find(const char *stem);

@@ -1,23 +1,9 @@
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_pair.h"
 
 #include "shading/brdf/albedo.h"
 #include "shading/brdf/cloth.h"
 #include "shading/brdf/fresnel.h"
 #include "shading/brdf/sampling.h"
-
-/* The model `name` at nl, nv and the azimuth between, with parameters (plane, value) of one row. */
-static double eval_at(const char *name, const double *values, double nl, double phi_l, double nv,
-                      double phi_v)
-{
-    const weft_brdf *brdf;
-    double l[3], v[3], f[3];
-    if (weft_brdf_find(name, &brdf, NULL) != WEFT_OK)
-        return (double)NAN;
-    weft_brdf_direction(nl, phi_l, l);
-    weft_brdf_direction(nv, phi_v, v);
-    weft_brdf_eval_one(brdf, values, l, v, f);
-    return f[0];
-}
 
 static void fresnel(int n, const double *const *in, double *const *out)
 {
@@ -44,7 +30,7 @@ static void ggx_spec(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         const double values[WEFT_BRDF_MAX_PLANES] = {in[1][i], in[1][i], in[1][i], in[0][i]};
-        out[0][i] = eval_at("ggx-specular", values, in[2][i], 0, in[3][i], in[4][i]);
+        out[0][i] = weft_vectors_eval_at("ggx-specular", values, in[2][i], 0, in[3][i], in[4][i]);
     }
 }
 
@@ -61,7 +47,7 @@ static void ggx_aniso(int n, const double *const *in, double *const *out)
         out[1][i] = ab;
         out[2][i] = weft_ggx_d_aniso(h.h[0], h.h[1], h.nh, at, ab);
         out[3][i] = weft_ggx_v1_aniso(l[0], l[1], l[2], at, ab) * weft_ggx_v1_aniso(v[0], v[1], h.nv, at, ab);
-        out[4][i] = eval_at("ggx-anisotropic", values, in[2][i], in[3][i], in[4][i], in[5][i]);
+        out[4][i] = weft_vectors_eval_at("ggx-anisotropic", values, in[2][i], in[3][i], in[4][i], in[5][i]);
     }
 }
 
@@ -69,16 +55,9 @@ static void diffuse(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         const double f0 = in[0][i], values[WEFT_BRDF_MAX_PLANES] = {1, 1, 1, f0, f0, f0};
-        out[0][i] = eval_at("lambert-balanced", values, in[1][i], 0, in[2][i], in[3][i]);
-        out[1][i] = eval_at("lambert-coupled", values, in[1][i], 0, in[2][i], in[3][i]);
+        out[0][i] = weft_vectors_eval_at("lambert-balanced", values, in[1][i], 0, in[2][i], in[3][i]);
+        out[1][i] = weft_vectors_eval_at("lambert-coupled", values, in[1][i], 0, in[2][i], in[3][i]);
     }
-}
-
-/* Views of integrals: raised to 1e-4 as for every model (S-CNV-02); what is no cosine gives NaN. */
-static bool usable_view(double *nv)
-{
-    *nv = weft_max(*nv, WEFT_MIN_NV);
-    return *nv <= 1;
 }
 
 /* K of S-ORD-08: the albedo of the balanced Lambert at F0 = 0. */
@@ -90,7 +69,7 @@ static void diffuse_albedo(int n, const double *const *in, double *const *out)
         return;
     for (int i = 0; i < n; i++) {
         double albedo[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[0][i];
-        if (usable_view(&nv))
+        if (weft_vectors_view(&nv))
             weft_brdf_albedo(brdf, values, nv, 0, WEFT_ALBEDO_EXACT, albedo);
         out[0][i] = albedo[0];
     }
@@ -114,7 +93,7 @@ static void ggx_furnace(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         double alpha = in[0][i], sum[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[1][i];
-        if (usable_view(&nv))
+        if (weft_vectors_view(&nv))
             weft_albedo_integrate(furnace_integrand, &alpha, WEFT_ALBEDO_UPPER, nv, 0, false,
                                   WEFT_ALBEDO_EXACT, sum);
         for (int c = 0; c < 3; c++)
@@ -133,7 +112,7 @@ static void cloth_brdf(int n, const double *const *in, double *const *out)
     for (int i = 0; i < n; i++) {
         const double f0 = in[1][i], c = in[2][i];
         const double values[WEFT_BRDF_MAX_PLANES] = {c, c, c, f0, f0, f0, in[0][i], 4};
-        out[0][i] = eval_at("cloth", values, in[3][i], 0, in[4][i], in[5][i]);
+        out[0][i] = weft_vectors_eval_at("cloth", values, in[3][i], 0, in[4][i], in[5][i]);
     }
 }
 
@@ -146,7 +125,7 @@ static void cloth_albedo(int n, const double *const *in, double *const *out)
     for (int i = 0; i < n; i++) {
         const double values[WEFT_BRDF_MAX_PLANES] = {0, 0, 0, 0, 1, 1, in[0][i], 4};
         double albedo[3] = {(double)NAN, (double)NAN, (double)NAN}, nv = in[1][i];
-        if (usable_view(&nv))
+        if (weft_vectors_view(&nv))
             weft_brdf_albedo(brdf, values, nv, 0, WEFT_ALBEDO_EXACT, albedo);
         out[0][i] = albedo[1] - albedo[0];
         out[1][i] = albedo[0];
@@ -154,23 +133,12 @@ static void cloth_albedo(int n, const double *const *in, double *const *out)
     }
 }
 
-static void hammersley(int n, const double *const *in, double *const *out)
-{
-    for (int i = 0; i < n; i++) {
-        double point[2];
-        weft_hammersley((uint32_t)in[0][i], (uint32_t)in[1][i], point);
-        out[0][i] = point[0];
-        out[1][i] = point[1];
-    }
-}
-
-const weft_vectors_model weft_vectors_models[] = {
+const weft_vectors_model weft_vectors_reflectance[] = {
     {"cloth_D", "S-ORD-14", "alpha A nh", "D", 1e-11, cloth_d},
     {"cloth_albedo", "S-ORD-15", "alpha nv", "scale bias white", 1e-11, cloth_albedo},
     {"cloth_brdf", "S-ORD-15", "alpha f0 cdiff nl nv phi", "f", 1e-11, cloth_brdf},
     {"fresnel", "S-UE4-05 S-FC3-11 S-BLG-04", "f0 u", "schlick ue4_sg fc3_sg exact", 1e-12, fresnel},
     {"ggx_furnace", "S-ORD-05", "alpha nv", "separable correlated bias_separable", 1e-10, ggx_furnace},
-    {"hammersley", "S-UE4-06", "i N", "x y", 1e-15, hammersley},
     {"ord_diffuse", "S-ORD-08 S-ORD-09", "f0 nl nv phi", "balanced coupled", 1e-12, diffuse},
     {"ord_diffuse_albedo", "S-ORD-08", "nv", "K", 1e-12, diffuse_albedo},
     {"ord_ggx_aniso", "S-ORD-06 S-ORD-07", "alpha anisotropy nl phi_l nv phi_v f0", "at ab D V f", 1e-9,

@@ -1,0 +1,135 @@
+#include "shading/brdf/disney.h"
+#include "shading/brdf/fresnel.h"
+#include "shading/brdf/sampling.h"
+
+#include <stdbool.h>
+
+/* first planes, in the order of params */
+enum {
+    BASE = 0,
+    SUBSURFACE = 3,
+    METALLIC,
+    SPECULAR,
+    SPECULAR_TINT,
+    ROUGHNESS,
+    ANISOTROPIC,
+    SHEEN,
+    SHEEN_TINT,
+    CLEARCOAT,
+    CLEARCOAT_GLOSS
+};
+
+static const weft_brdf_param params[] = {
+    {"base", NULL, 3, 0, 1, 0.5, "", "base colour"},
+    {"subsurface", NULL, 1, 0, 1, 0, "", "share of the flatter diffuse lobe"},
+    {"metallic", NULL, 1, 0, 1, 0, "", "0 dielectric, 1 metal"},
+    {"specular", NULL, 1, 0, 1, 0.5, "", "F0 of dielectrics is 0.08 of this"},
+    {"specular-tint", "specularTint", 1, 0, 1, 0, "", "tints F0 of dielectrics with the base colour"},
+    {"roughness", NULL, 1, 0, 1, 0.5, "", "the artist's roughness; the width of the lobe is its square"},
+    {"anisotropic", NULL, 1, 0, 1, 0, "", "stretches the highlight along the tangent"},
+    {"sheen", NULL, 1, 0, 1, 0, "", "light at grazing angles, for cloth"},
+    {"sheen-tint", "sheenTint", 1, 0, 1, 0.5, "", "tints the sheen with the base colour"},
+    {"clearcoat", NULL, 1, 0, 1, 0, "", "a second lobe of F0 0.04"},
+    {"clearcoat-gloss", "clearcoatGloss", 1, 0, 1, 1, "", "0 satin, 1 gloss"},
+    {0},
+};
+
+static double lerp(double a, double b, double t)
+{
+    return a + (b - a) * t;
+}
+
+/* What of one pair of directions does not depend on the colour. */
+typedef struct terms {
+    double diffuse;   /* of the base colour */
+    double sheen;     /* of the sheen's colour */
+    double specular;  /* of F */
+    double clearcoat; /* without colour */
+    double weight;    /* Schlick's, of lh */
+} terms;
+
+static terms terms_of(const weft_brdf_batch *b, int i, const weft_half *h)
+{
+    const double rough = b->param[ROUGHNESS][i], metallic = b->param[METALLIC][i];
+    const double wl = weft_schlick_weight(h->nl), wv = weft_schlick_weight(h->nv);
+    const double *const hv = h->h;
+    double at, ab;
+    terms t = {.weight = weft_schlick_weight(h->lh)};
+    weft_disney_widths(rough, b->param[ANISOTROPIC][i], &at, &ab);
+    const double fd = weft_disney_diffuse(wl, wv, h->lh, rough);
+    const double ss = weft_disney_subsurface(wl, wv, h->nl, h->nv, h->lh, rough);
+    t.diffuse = lerp(fd, ss, b->param[SUBSURFACE][i]) / WEFT_PI * (1 - metallic);
+    t.sheen = t.weight * b->param[SHEEN][i] * (1 - metallic);
+    const double ag = (0.5 + rough / 2) * (0.5 + rough / 2); /* masking of a rougher lobe than D's */
+    t.specular =
+        weft_ggx_d_aniso(hv[0], hv[1], h->nh, at, ab) * weft_ggx_v1(h->nl, ag) * weft_ggx_v1(h->nv, ag);
+    const double coat = weft_disney_gtr1(h->nh, h->s2, lerp(0.1, 0.001, b->param[CLEARCOAT_GLOSS][i]));
+    t.clearcoat = 0.25 * b->param[CLEARCOAT][i] * weft_fresnel_schlick(0.04, h->lh) * coat *
+                  weft_ggx_v1(h->nl, 0.25) * weft_ggx_v1(h->nv, 0.25);
+    return t;
+}
+
+/* f = [lerp(Fd, ss, subsurface) C/pi + sheen] (1 - metallic) + Gs Fs Ds + clearcoat/4 Gr Fr Dr, S-BLG-05.
+ * Below either horizon it is 0, as published: no raised n.v. */
+static void eval(const weft_brdf_batch *b, double *const value[3])
+{
+    for (int i = 0; i < b->n; i++) {
+        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
+                                         b->view[1][i], b->view[2][i]);
+        const bool lit = h.valid > 0 && b->view[2][i] > 0;
+        const terms t = lit ? terms_of(b, i, &h) : (terms){0};
+        const double luminance =
+            0.3 * b->param[BASE][i] + 0.6 * b->param[BASE + 1][i] + 0.1 * b->param[BASE + 2][i];
+        for (int c = 0; c < 3; c++) {
+            const double base = b->param[BASE + c][i], tint = luminance > 0 ? base / luminance : 1;
+            const double dielectric =
+                0.08 * b->param[SPECULAR][i] * lerp(1, tint, b->param[SPECULAR_TINT][i]);
+            const double f0 = lerp(dielectric, base, b->param[METALLIC][i]);
+            value[c][i] = t.diffuse * base + t.sheen * lerp(1, tint, b->param[SHEEN_TINT][i]) +
+                          t.specular * lerp(f0, 1, t.weight) + t.clearcoat;
+        }
+    }
+}
+
+static void widths(const weft_brdf_batch *b, int i, double *at, double *ab)
+{
+    weft_disney_widths(b->param[ROUGHNESS][i], b->param[ANISOTROPIC][i], at, ab);
+}
+
+static double specular_share(const weft_brdf_batch *b, int i)
+{
+    const double base = (b->param[BASE][i] + b->param[BASE + 1][i] + b->param[BASE + 2][i]) / 3;
+    const double f0 = lerp(0.08 * b->param[SPECULAR][i], base, b->param[METALLIC][i]);
+    return weft_sample_share(weft_fresnel_schlick(f0, weft_max(b->view[2][i], 0)),
+                             base * (1 - b->param[METALLIC][i]));
+}
+
+static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
+{
+    for (int i = 0; i < b->n; i++) {
+        double at, ab;
+        widths(b, i, &at, &ab);
+        weft_sample_mixed(b, i, specular_share(b, i), at, ab, u, light);
+    }
+}
+
+static void pdf(const weft_brdf_batch *b, double *density)
+{
+    for (int i = 0; i < b->n; i++) {
+        double at, ab;
+        widths(b, i, &at, &ab);
+        density[i] = weft_pdf_mixed(b, i, specular_share(b, i), at, ab);
+    }
+}
+
+/* Not passive: a white base returns 1.04-1.09 by default and up to 1.6 with sheen or subsurface. */
+const weft_brdf weft_brdf_disney = {
+    .name = "disney",
+    .summary = "Disney's principled model of 2012 with its eleven parameters",
+    .source = "Burley 2012, Physically-Based Shading at Disney; S-BLG-05",
+    .flags = WEFT_BRDF_RECIPROCAL | WEFT_BRDF_ANISOTROPIC,
+    .params = params,
+    .eval = eval,
+    .sample = sample,
+    .pdf = pdf,
+};

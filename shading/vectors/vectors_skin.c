@@ -1,0 +1,2 @@
+#include "shading/vectors/vectors.h"
+const weft_vectors_model weft_vectors_skin[] = {{0}};
