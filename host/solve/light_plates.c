@@ -20,6 +20,20 @@ static weft_err halve(weft_plate *plate, weft_error *err)
     return WEFT_OK;
 }
 
+/* S-ORD-17 drops what exceeds 98 % of saturation.  In a bracket the merging has chosen already; pictures
+ * made by others do not say where their sensor saturates. */
+static double saturation_limit(const weft_set *set, int light)
+{
+    double limit = 0;
+    int n = 0;
+    for (int i = 0; i < set->n_frames; i++)
+        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light) {
+            limit = 0.98 / (set->frames[i].exposure_s * set->frames[i].gain);
+            n++;
+        }
+    return n == 1 && set->cfa != WEFT_CFA_NONE ? limit : 0;
+}
+
 static weft_err load_light(const weft_set *set, int light, const weft_plate *ambient, bool half,
                            weft_plate *plate, weft_error *err)
 {
@@ -42,6 +56,7 @@ weft_err weft_light_plates_load(const weft_set *set, bool half, weft_light_plate
     weft_progress_begin(&progress, "reading", "lights", n);
     while (p->n < n && status == WEFT_OK) {
         weft_plate *const plate = &p->plate[p->n];
+        p->most[p->n] = saturation_limit(set, p->n);
         p->n++; /* a plate that fails half way is freed with the others */
         status = load_light(set, p->n - 1, present ? &ambient : NULL, half, plate, err);
         if (status == WEFT_OK)
@@ -71,5 +86,6 @@ void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_
             in[j].rgb[c] = weft_image_row(&p->image, p->image.planes == 3 ? c : 0, row);
         in[j].clipped = p->clipped.data ? p->clipped.data + (size_t)row * (size_t)p->clipped.width : NULL;
         in[j].least = (float)(3 * p->noise_floor);
+        in[j].most = (float)plates->most[j];
     }
 }

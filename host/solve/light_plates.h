@@ -9,6 +9,7 @@ typedef struct weft_light_plates {
     int n, width, height; /* at solving size */
     weft_cfa cfa;         /* of mosaics at full size; NONE for grey and RGB, and at half size */
     weft_plate plate[WEFT_LIGHTS_MAX];
+    double most[WEFT_LIGHTS_MAX]; /* 98 % of saturation as linear value; 0 for brackets and pictures */
 } weft_light_plates;
 
 /** Reads every light, the ambient plate subtracted.  `half` makes one RGB pixel of each 2x2 cell or pixels.

@@ -64,6 +64,7 @@ WEFT_INLINE void read_colours(const block_nodes *nodes, int step_log2, int j, co
     float scale[3][LANES];
     for (int c = 0; c < 3; c++)
         expand(nodes, step_log2, 2 + 3 * j + c, scale[c]);
+    const float limit = in->most > 0 ? in->most : INFINITY;
     const float *const red = in->rgb[0] + first, *const green = in->rgb[1] + first,
                        *const blue = in->rgb[2] + first;
 #pragma omp simd
@@ -71,7 +72,7 @@ WEFT_INLINE void read_colours(const block_nodes *nodes, int step_log2, int j, co
         const float r = red[k] * scale[0][k], g = green[k] * scale[1][k], b = blue[k] * scale[2][k];
         const float rg = red[k] > green[k] ? red[k] : green[k], most = rg > blue[k] ? rg : blue[k];
         const int finite = fabsf(r) + fabsf(g) + fabsf(b) < 1e30F; /* false for NaN */
-        const int use = finite & (most >= in->least);
+        const int use = finite & (most >= in->least) & (most <= limit);
         s->at[j].weight[k] = use ? 1.0F : 0.0F;
         s->at[j].value[0][k] = use ? r : 0.0F;
         s->at[j].value[1][k] = use ? g : 0.0F;
@@ -87,11 +88,12 @@ WEFT_INLINE void read_sites(const block_nodes *nodes, int step_log2, int j, cons
     float scale[2][LANES];
     expand(nodes, step_log2, 2 + 3 * j + even, scale[0]);
     expand(nodes, step_log2, 2 + 3 * j + odd, scale[1]);
+    const float limit = in->most > 0 ? in->most : INFINITY;
     const float *const site = in->rgb[0] + first;
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
         const float value = site[k] * (k & 1 ? scale[1][k] : scale[0][k]);
-        const int use = (fabsf(value) < 1e30F) & (site[k] >= in->least);
+        const int use = (fabsf(value) < 1e30F) & (site[k] >= in->least) & (site[k] <= limit);
         s->at[j].weight[k] = use ? 1.0F : 0.0F;
         s->at[j].value[0][k] = use ? value : 0.0F;
         s->at[j].grey[k] = use ? value : 0.0F;
@@ -153,7 +155,7 @@ WEFT_INLINE weft_solve_row_in copy_margin(const weft_solve_row_in *in, int first
         memcpy(m->clipped, in->clipped + first, (size_t)n);
     else
         memset(m->clipped, 0, (size_t)n);
-    return (weft_solve_row_in){{m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least};
+    return (weft_solve_row_in){{m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least, in->most};
 }
 
 WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, int row, int block,

@@ -10,6 +10,7 @@ typedef struct weft_solve_row_in {
     const float *rgb[3];    /* [width] linear values (1/s); all three the same for grey and mosaics */
     const uint8_t *clipped; /* [width] non-zero: not to be used; NULL: none */
     float least;            /* the largest channel must reach this (3 sigma of black); 0: no rule */
+    float most;             /* and not exceed this (98 % of saturation); 0: no rule */
 } weft_solve_row_in;
 
 /** Where the answers of a row go; all [width]. */
@@ -34,8 +35,8 @@ typedef struct weft_solve_plan {
  * A mosaic needs no demosaicing here: all samples of a site are of one colour, and the normal does not ask
  * which.  Colours made up from neighbours under ten lights would blur the normals of fine weave by degrees.
  *
- * A sample is left out when it is clipped, not finite, below `least`, or where its light does not shine.
- * Pure and without allocation; from any thread.  The same input gives the same bits on any thread.
+ * A sample is left out when it is clipped, not finite, below `least`, above `most`, or where its light does
+ * not shine. Pure and without allocation; from any thread.  The same input gives the same bits on any thread.
  *
  * @param in   [n_lights]
  * @param row  its parity tells the colours of a mosaic

@@ -68,7 +68,8 @@ static double solve_ns(weft_cfa cfa)
                 in[j] = (weft_solve_row_in){
                     {w.in[j][0] + at, w.in[j][cfa ? 0 : 1] + at, w.in[j][cfa ? 0 : 2] + at},
                     w.clipped[j] + at,
-                    0.01F};
+                    0.01F,
+                    1e6F};
         const weft_solve_row_out out = {.normal = {w.out[0] + at, w.out[1] + at, w.out[2] + at},
                                         .albedo = {w.out[3] + at, w.out[4] + at, w.out[5] + at},
                                         .residual = w.out[6] + at,

@@ -60,7 +60,7 @@ static void end(void)
     weft_incidence_fini(&s.incidence);
 }
 
-static float least;
+static float least, most;
 
 static void solve_rows(void *context, int band, int row_begin, int row_end)
 {
@@ -69,8 +69,8 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
     for (int v = row_begin; v < row_end; v++) {
         weft_solve_row_in in[N];
         for (int j = 0; j < N; j++)
-            in[j] =
-                (weft_solve_row_in){{s.rgb[j][0][v], s.rgb[j][1][v], s.rgb[j][2][v]}, s.clipped[j][v], least};
+            in[j] = (weft_solve_row_in){
+                {s.rgb[j][0][v], s.rgb[j][1][v], s.rgb[j][2][v]}, s.clipped[j][v], least, most};
         const weft_solve_row_out out = {.normal = {s.out[0][v], s.out[1][v], s.out[2][v]},
                                         .albedo = {s.out[3][v], s.out[4][v], s.out[5][v]},
                                         .residual = s.out[6][v],
@@ -347,11 +347,13 @@ static void test_bad_samples_are_left_out(void **state)
     s.rgb[6][2][10][23] = -INFINITY;
     for (int c = 0; c < 3; c++)
         s.rgb[7][c][10][24] = 1e-4F; /* below three sigma of black */
+    s.rgb[8][1][10][25] = 900;       /* nearly saturated */
     s.clipped[9][10][WIDTH - 1] = 255;
     s.rgb[9][0][10][WIDTH - 1] = 0;
     least = 1e-3F;
+    most = 800;
     solve();
-    least = 0;
+    least = most = 0;
     check_all(0.002, 5e-5);
     end();
 }
