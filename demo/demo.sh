@@ -61,16 +61,16 @@ calibrate() {
     "$weft" calibrate "$1" "${@:2}" -o "$out/scanner.cal"
 }
 
-truth() {
-    tell "sample $1"
-    tell "truth $out/truth/$1 0.125"
-}
-
 stage "start the rig" start_rig
 stage "capture boards" capture_boards
-for set in white munsell macbeth "${samples[@]}"; do
+for set in white munsell macbeth; do
     stage "capture $set" capture "$set" "$out/sets/$set.set"
 done
+for sample in "${samples[@]}"; do
+    stage "capture $sample" capture "$sample" "$out/sets/$sample.set"
+    stage "truth $sample" tell "truth $out/truth/$sample 0.125" # while the sample lies there; read at the end
+done
+tell quit >>"$log"
 stage "calibrate lens" calibrate lens "$out"/boards/board-?.set "$out"/boards/board-??.set --square-mm 10 \
     --board-on-table "$out/boards/board-table.set"
 stage "calibrate lights" calibrate lights "$out/sets/white.set"
@@ -86,11 +86,9 @@ for sample in "${samples[@]}"; do
     stage "contact $sample" "$weft" contact "$out/$sample.maps" -o "$out/pictures/$sample-contact.png"
 done
 for sample in "${samples[@]}"; do
-    stage "truth $sample" truth "$sample"
     "$weft" compare "$out/$sample.maps" "$out/truth/$sample/plane.maps" --json >"$out/compare-$sample.json"
 done
 "$weft" compare "$out/scanner.cal" "$out/truth/twill/truth.cal" --json >"$out/compare-calibration.json"
-tell quit >>"$log"
 
 # The figures at the top are those of the worse fabric.
 jq -n --argjson seconds "$seconds" --slurpfile cal "$out/scanner.cal/calibration.json" \
