@@ -14,6 +14,7 @@ typedef struct integral {
     weft_albedo_domain domain;
     bool anisotropic;
     double nv, sv, view[3];
+    double min_nl;  /* lights below it are left out */
     double phi_rad; /* azimuth of the view, and its cosine and sine */
     double tangent[2];
     weft_quadrature q;
@@ -21,11 +22,12 @@ typedef struct integral {
 } integral;
 
 /* Half the range of azimuths (from that of the view) in which half vectors at polar angle theta have
- * n.l = 2 (v.h) nh - nv > 0 (UPPER), or v.h > 0 (VISIBLE). */
+ * n.l = 2 (v.h) nh - nv > min_nl (UPPER), or v.h > 0 (VISIBLE). */
 static double azimuth_reach(const integral *in, weft_albedo_domain domain, double theta)
 {
     const double nh = cos(theta), sh = sin(theta);
-    const double over = domain == WEFT_ALBEDO_UPPER ? in->nv * (1 - 2 * nh * nh) : -in->nv * nh * sh;
+    const double over =
+        domain == WEFT_ALBEDO_UPPER ? in->min_nl + in->nv * (1 - 2 * nh * nh) : -in->nv * nh * sh;
     const double under = domain == WEFT_ALBEDO_UPPER ? 2 * nh * sh * in->sv : sh * sh * in->sv;
     if (over <= -under)
         return WEFT_PI;
@@ -128,35 +130,49 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
-                           double phi_rad, bool anisotropic, weft_albedo_effort effort, double value[3])
+/* Runs over all half vectors; `in` has its inputs. */
+static void integrate(integral *in, weft_albedo_effort effort, double value[3])
 {
     static const double decades[] = {0, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 1, 2.5, 10, 100, 1e3, 1e4};
     enum { N_DECADES = sizeof decades / sizeof decades[0], N_CUTS = N_DECADES + 4 };
-    integral in = {.fn = fn,
-                   .context = context,
-                   .domain = domain,
-                   .anisotropic = anisotropic,
-                   .nv = nv,
-                   .phi_rad = phi_rad};
-    assert(nv > 0 && nv <= 1);
-    weft_brdf_direction(nv, phi_rad, in.view);
-    in.sv = sqrt((1 - nv) * (1 + nv));
-    in.tangent[0] = cos(phi_rad);
-    in.tangent[1] = sin(phi_rad);
-    weft_quadrature_init(&in.q, effort == WEFT_ALBEDO_EXACT ? 16 : 8);
+    assert(in->nv > 0 && in->nv <= 1);
+    weft_brdf_direction(in->nv, in->phi_rad, in->view);
+    in->sv = sqrt((1 - in->nv) * (1 + in->nv));
+    in->tangent[0] = cos(in->phi_rad);
+    in->tangent[1] = sin(in->phi_rad);
+    weft_quadrature_init(&in->q, effort == WEFT_ALBEDO_EXACT ? 16 : 8);
     /* where the two horizons begin to cut the rings of half vectors, and where they have cut them off */
-    const double view_angle = atan2(in.sv, nv), half_pi = WEFT_PI / 2;
-    double cuts[N_CUTS] = {(half_pi - view_angle) / 2, (half_pi + view_angle) / 2, half_pi - view_angle,
+    const double view_angle = atan2(in->sv, in->nv), half_pi = WEFT_PI / 2, edge = acos(in->min_nl);
+    double cuts[N_CUTS] = {fabs(edge - view_angle) / 2, (edge + view_angle) / 2, half_pi - view_angle,
                            half_pi};
     for (int i = 0; i < N_DECADES; i++)
         cuts[4 + i] = atan(decades[i]);
     qsort(cuts, N_CUTS, sizeof cuts[0], by_value);
     for (int i = 0; i + 1 < N_CUTS; i++)
         if (cuts[i] < cuts[i + 1])
-            add_interval(&in, cuts[i], cuts[i + 1]);
+            add_interval(in, cuts[i], cuts[i + 1]);
     for (int c = 0; c < 3; c++)
-        value[c] = in.sum[c];
+        value[c] = in->sum[c];
+}
+
+void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
+                           double phi_rad, bool anisotropic, weft_albedo_effort effort, double value[3])
+{
+    integral in = {.fn = fn,
+                   .context = context,
+                   .domain = domain,
+                   .anisotropic = anisotropic,
+                   .nv = nv,
+                   .phi_rad = phi_rad};
+    integrate(&in, effort, value);
+}
+
+void weft_albedo_integrate_cone(weft_albedo_fn *fn, void *context, double nv, double min_nl,
+                                weft_albedo_effort effort, double value[3])
+{
+    integral in = {.fn = fn, .context = context, .domain = WEFT_ALBEDO_UPPER, .nv = nv, .min_nl = min_nl};
+    assert(min_nl >= 0 && min_nl <= 1);
+    integrate(&in, effort, value);
 }
 
 /* A model and its constant parameters spread over a batch. */

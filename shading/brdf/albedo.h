@@ -35,6 +35,10 @@ typedef enum weft_albedo_domain {
 void weft_albedo_integrate(weft_albedo_fn *fn, void *context, weft_albedo_domain domain, double nv,
                            double phi_rad, bool anisotropic, weft_albedo_effort effort, double value[3]);
 
+/** The same over lights with n.l >= min_nl only (0..1), weighted by n.l, for functions that do not turn. */
+void weft_albedo_integrate_cone(weft_albedo_fn *fn, void *context, double nv, double min_nl,
+                                weft_albedo_effort effort, double value[3]);
+
 /** Directional albedo of a model: the share of light that comes back when all of the hemisphere shines,
  *  seen from (nv, phi_rad); by reciprocity also what a beam from there gives back in all. */
 void weft_brdf_albedo(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES], double nv,

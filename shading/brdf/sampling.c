@@ -1,5 +1,19 @@
 #include "shading/brdf/sampling.h"
 
+void weft_sample_ggx_normal(const double n[3], double alpha, double u1, double u2, double h[3])
+{
+    const double cosine = weft_sample_ggx_cosine(alpha, u2), phi = 2 * WEFT_PI * u1;
+    const double sine = alpha * sqrt(u2 / (1 + (alpha * alpha - 1) * u2)); /* without cancellation */
+    const double x = sine * cos(phi), y = sine * sin(phi);
+    const int flat = fabs(n[2]) < 0.999; /* up is z, else x */
+    const double inverse = 1 / (flat ? hypot(n[0], n[1]) : hypot(n[1], n[2]));
+    const double t[3] = {flat ? -n[1] * inverse : 0, flat ? n[0] * inverse : -n[2] * inverse,
+                         flat ? 0 : n[1] * inverse};
+    const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+    for (int c = 0; c < 3; c++)
+        h[c] = t[c] * x + b[c] * y + n[c] * cosine;
+}
+
 void weft_sample_mixed(const weft_brdf_batch *batch, int i, double share, double at, double ab,
                        const double *const u[3], double *const light[3])
 {

@@ -43,6 +43,17 @@ static inline void weft_sample_ggx_visible(const double v[3], double at, double 
     h[2] = length2 > 0 ? up * scale : 1;
 }
 
+/** Cosine n.h of a GGX normal with density D(h) (n.h), from u in [0, 1):
+ *  sqrt((1 - u)/(1 + (alpha^2 - 1) u)).  Source: Walter et al. 2007 eq. 35; S-UE4-06. */
+static inline double weft_sample_ggx_cosine(double alpha, double u)
+{
+    return sqrt((1 - u) / (1 + (alpha * alpha - 1) * u));
+}
+
+/** The same normal about a unit n, azimuth 2 pi u1, in the frame t = norm(up x n), b = n x t with up = z, or
+ * x where |n.z| >= 0.999.  Source: Karis 2013, ImportanceSampleGGX; S-UE4-06. */
+void weft_sample_ggx_normal(const double n[3], double alpha, double u1, double u2, double h[3]);
+
 /** Mirror of v about h. */
 static inline void weft_reflect(const double v[3], const double h[3], double l[3])
 {
