@@ -43,7 +43,7 @@ typedef struct render_job {
     bool plate_is_raised;
     lane_colours *colours;
     lane_lamps lamps;
-    weft_cloth_gloss gloss;
+    weft_fabric_gloss gloss;
     weft_rig_frames *frames;
 } render_job;
 
@@ -127,14 +127,14 @@ INLINE void aim_lamps(const lane_lamps *lamps, const weft_rig_hit *hit, lane_ray
 }
 
 /* 1 where the lamp sees the point, 0 where something is between. */
-INLINE void cast_shadows(const render_job *job, const weft_cloth_patch *patch, const weft_rig_hit *hit,
+INLINE void cast_shadows(const render_job *job, const weft_fabric_patch *patch, const weft_rig_hit *hit,
                          const lane_rays *rays, float visible[LANES])
 {
     for (int i = 0; i < LANES; i++) /* what faces away needs no shadow; idle lanes have no strength */
         visible[i] =
             rays->strength[i] > 0 && hit->nx * rays->x[i] + hit->ny * rays->y[i] + hit->nz * rays->z[i] > 0;
     if (job->sample->has_cloth) {
-        weft_cloth_see(&job->sample->cloth, patch, &hit->cloth, rays->x, rays->y, rays->z, visible);
+        weft_fabric_see(&job->sample->cloth, patch, &hit->cloth, rays->x, rays->y, rays->z, visible);
     } else if (job->plate_is_raised && hit->material == 0) {
         const weft_rig_plate *const plate = &job->sample->plate;
         for (int i = 0; i < WEFT_RIG_N_LIGHTS; i++) {
@@ -148,7 +148,7 @@ INLINE void cast_shadows(const render_job *job, const weft_cloth_patch *patch, c
 
 /* The mirror term of pi f (n.l): GGX, anisotropic, with Smith's joint masking for the mean roughness
    (Burley 2012, eq. 13; Heitz 2014, eq. 99; Schlick's Fresnel). */
-INLINE void add_mirror(const weft_cloth_gloss *gloss, const weft_rig_hit *hit, const float eye[3],
+INLINE void add_mirror(const weft_fabric_gloss *gloss, const weft_rig_hit *hit, const float eye[3],
                        const lane_rays *rays, float term[LANES])
 {
     const float bx = hit->ny * hit->tz - hit->nz * hit->ty, by = hit->nz * hit->tx - hit->nx * hit->tz,
@@ -177,7 +177,7 @@ INLINE void add_mirror(const weft_cloth_gloss *gloss, const weft_rig_hit *hit, c
     }
 }
 
-INLINE void shade(const render_job *job, const weft_cloth_patch *patch, const weft_rig_hit *hit,
+INLINE void shade(const render_job *job, const weft_fabric_patch *patch, const weft_rig_hit *hit,
                   const float eye[3], const lane_rays *rays, int colour, float sum[LANES], float *room)
 {
     float visible[LANES], mirror[LANES] = {0};
@@ -201,9 +201,9 @@ INLINE void render_pixel(const render_job *job, int u, int v)
 {
     const int n = job->scene->setup.supersample, colour = weft_cfa_colour(WEFT_CFA_RGGB, u, v);
     const weft_rig_footprint at = weft_rig_footprint_at(job->view, u, v);
-    weft_cloth_patch patch = {0};
+    weft_fabric_patch patch = {0};
     if (job->sample->has_cloth)
-        patch = weft_cloth_patch_at(&job->sample->cloth, at.x, at.y);
+        patch = weft_fabric_patch_at(&job->sample->cloth, at.x, at.y);
     const float *const c = job->tracer.centre;
     weft_rig_hit hit;
     lane_rays rays;
@@ -299,9 +299,9 @@ static void truth_pixel(const truth_job *job, int u, int v)
 {
     const int n = job->scene->setup.supersample;
     const weft_rig_footprint at = weft_rig_footprint_at(job->view, u, v);
-    weft_cloth_patch patch = {0};
+    weft_fabric_patch patch = {0};
     if (job->sample->has_cloth)
-        patch = weft_cloth_patch_at(&job->sample->cloth, at.x, at.y);
+        patch = weft_fabric_patch_at(&job->sample->cloth, at.x, at.y);
     float normal[3] = {0}, albedo[3] = {0};
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {

@@ -239,7 +239,7 @@ static weft_err init_cloth(weft_rig_sample *sample, const weft_rig_scene *scene,
         WEFT_TRY(weft_spectra_find_dye(&scene->spectra, weave->dyes[i], &dye, err));
         sample->materials[sample->n_materials++] = *dye;
     }
-    WEFT_TRY(weft_cloth_init(&sample->cloth, weave, scene->setup.seed, err));
+    WEFT_TRY(weft_fabric_init(&sample->cloth, weave, scene->setup.seed, err));
     sample->has_cloth = true;
     memcpy(sample->share, sample->cloth.dye_share, sizeof sample->cloth.dye_share);
     return WEFT_OK;
@@ -280,6 +280,6 @@ weft_err weft_rig_sample_init(weft_rig_sample *sample, const weft_rig_scene *sce
 
 void weft_rig_sample_fini(weft_rig_sample *sample)
 {
-    weft_cloth_fini(&sample->cloth);
+    weft_fabric_fini(&sample->cloth);
     *sample = (weft_rig_sample){0};
 }

@@ -5,7 +5,7 @@
 #define WEFT_HOST_RIG_SAMPLE_H
 
 #include "calibration/charts/chart.h"
-#include "host/rig/cloth.h"
+#include "host/rig/fabric.h"
 #include "host/rig/scene.h"
 
 #define WEFT_RIG_MAX_MATERIALS 48
@@ -38,7 +38,7 @@ typedef struct weft_rig_sample {
     double share[WEFT_RIG_MAX_MATERIALS];            /* of the surface; fabrics only (light between yarns) */
     bool has_plate, has_cloth;
     weft_rig_plate plate;
-    weft_cloth cloth;
+    weft_fabric cloth;
 } weft_rig_sample;
 
 /** Name and one line about sample `i`; false behind the last.  `name` has room for 32, `summary` for 128. */

@@ -59,13 +59,13 @@ static void trace_plate(const weft_rig_tracer *tracer, float gx, float gy, weft_
     hit->material = material;
 }
 
-static void trace_cloth(const weft_rig_tracer *tracer, const weft_cloth_patch *patch, float gx, float gy,
+static void trace_cloth(const weft_rig_tracer *tracer, const weft_fabric_patch *patch, float gx, float gy,
                         weft_rig_hit *hit)
 {
     const float *const c = tracer->centre;
     const float dx = (c[0] - gx) / c[2], dy = (c[1] - gy) / c[2];
-    weft_cloth_point *const point = &hit->cloth;
-    weft_cloth_meet(&tracer->sample->cloth, patch, gx, gy, dx, dy, point);
+    weft_fabric_point *const point = &hit->cloth;
+    weft_fabric_meet(&tracer->sample->cloth, patch, gx, gy, dx, dy, point);
     const float z = point->height;
     const float scale = 1 / sqrtf(1 + point->slope_x * point->slope_x + point->slope_y * point->slope_y);
     hit->x = gx + z * dx;
@@ -85,7 +85,7 @@ static void trace_cloth(const weft_rig_tracer *tracer, const weft_cloth_patch *p
     hit->material = point->dye;
 }
 
-void weft_rig_trace(const weft_rig_tracer *tracer, const weft_cloth_patch *patch, float gx, float gy,
+void weft_rig_trace(const weft_rig_tracer *tracer, const weft_fabric_patch *patch, float gx, float gy,
                     weft_rig_hit *hit)
 {
     if (tracer->sample->has_cloth)

@@ -23,7 +23,7 @@ typedef struct weft_rig_hit {
     float tx, ty, tz;         /* unit tangent along the fibres (fabric only) */
     float strength, openness; /* reflectance factor; share of the sky seen */
     int material;
-    weft_cloth_point cloth; /* fabric only */
+    weft_fabric_point cloth; /* fabric only */
 } weft_rig_hit;
 
 /** Rays from `centre` through points of the table to the plate. */
@@ -41,7 +41,7 @@ static inline void weft_rig_plate_coordinates(const weft_rig_projection *p, doub
 weft_rig_tracer weft_rig_tracer_make(const weft_rig_sample *sample, weft_vec3 centre);
 
 /** Where the ray through table point (gx, gy) meets the sample.  `patch` holds around it (fabric only). */
-void weft_rig_trace(const weft_rig_tracer *tracer, const weft_cloth_patch *patch, float gx, float gy,
+void weft_rig_trace(const weft_rig_tracer *tracer, const weft_fabric_patch *patch, float gx, float gy,
                     weft_rig_hit *hit);
 
 /** Table point of pixel (u, v) and its change per pixel, from the view's grid. */

@@ -1,5 +1,5 @@
 /* The fabrics of the virtual scanner. */
-#include "host/rig/cloth.h"
+#include "host/rig/fabric.h"
 
 /* Matte cotton: a weak, broad sheen.  The fibre's index 1.55 gives 4.6 % at normal incidence.  Measured
    reflectances hold already what the fuzz scatters of it to all sides; the sheen is only the rest. */

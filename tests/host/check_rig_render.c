@@ -141,10 +141,10 @@ static void make_wave(weft_rig_sample *sample)
 {
     assert_ok(weft_rig_sample_init(sample, &scene, "plain-weave", err));
     sample->materials[0] = weft_spectrum_flat(0.6);
-    weft_cloth *const cloth = &sample->cloth;
+    weft_fabric *const cloth = &sample->cloth;
     static weft_weave matte;
     matte = *cloth->weave;
-    matte.gloss = (weft_cloth_gloss){0};
+    matte.gloss = (weft_fabric_gloss){0};
     cloth->weave = &matte;
     cloth->turn_cos = 1;
     cloth->turn_sin = 0;
@@ -158,10 +158,10 @@ static void make_wave(weft_rig_sample *sample)
             const double x = column * WEFT_CLOTH_PERIOD_MM / WEFT_CLOTH_TEXELS;
             const size_t i = (size_t)row * WEFT_CLOTH_TEXELS + (size_t)column;
             cloth->height[i] = (float)wave_height(x);
-            cloth->texels[i] = (weft_cloth_texel){.height = (float)wave_height(x),
-                                                  .slope_x = (float)(WAVE_MM * WAVE_K * cos(WAVE_K * x)),
-                                                  .strength = 255 / 2,
-                                                  .openness = 255};
+            cloth->texels[i] = (weft_fabric_texel){.height = (float)wave_height(x),
+                                                   .slope_x = (float)(WAVE_MM * WAVE_K * cos(WAVE_K * x)),
+                                                   .strength = 255 / 2,
+                                                   .openness = 255};
         }
 }
 

@@ -1,5 +1,5 @@
 /* Weaving the tile, and meeting its surface. */
-#include "host/rig/cloth.h"
+#include "host/rig/fabric.h"
 
 #include "core/mem.h"
 #include "core/parallel.h"
@@ -39,7 +39,7 @@ typedef struct yarn_system {
 } yarn_system;
 
 typedef struct loom {
-    weft_cloth *cloth;
+    weft_fabric *cloth;
     uint64_t seed;
     yarn_system warp, weft;
     float *openness; /* [COARSE][COARSE] */
@@ -169,7 +169,7 @@ static uint8_t to_byte(double x)
 }
 
 /* Woven surface at a texel: the higher of warp and weft, with the ribs of its twist. */
-static void weave_texel(const loom *l, int column, int row, weft_cloth_texel *texel)
+static void weave_texel(const loom *l, int column, int row, weft_fabric_texel *texel)
 {
     const weft_weave *const weave = l->cloth->weave;
     const double x = column * TEXEL_MM, y = row * TEXEL_MM;
@@ -209,7 +209,7 @@ static void weave_texel(const loom *l, int column, int row, weft_cloth_texel *te
 }
 
 /* Corduroy: ribs of cut pile along y, rounded tops, steep flanks down to the ground weave. */
-static void wale_texel(const loom *l, double x, double y, weft_cloth_texel *texel)
+static void wale_texel(const loom *l, double x, double y, weft_fabric_texel *texel)
 {
     const weft_weave *const weave = l->cloth->weave;
     const double turn = TWO_PI * y / WEFT_CLOTH_PERIOD_MM;
@@ -232,7 +232,7 @@ static void wale_texel(const loom *l, double x, double y, weft_cloth_texel *texe
 
 /* ------------------------------------------------------------------------------------------ tile passes */
 
-static weft_cloth_texel *texel_at(const weft_cloth *cloth, int row, int column)
+static weft_fabric_texel *texel_at(const weft_fabric *cloth, int row, int column)
 {
     return &cloth->texels[(size_t)(row & (N - 1)) * N + (size_t)(column & (N - 1))];
 }
@@ -243,7 +243,7 @@ static void weave_rows(void *context, int band, int begin, int end)
     const loom *const l = context;
     for (int row = begin; row < end; row++)
         for (int column = 0; column < N; column++) {
-            weft_cloth_texel *const texel = texel_at(l->cloth, row, column);
+            weft_fabric_texel *const texel = texel_at(l->cloth, row, column);
             if (l->cloth->weave->wales)
                 wale_texel(l, column * TEXEL_MM, row * TEXEL_MM, texel);
             else
@@ -258,7 +258,7 @@ static void slope_rows(void *context, int band, int begin, int end)
     const float scale = (float)(0.5 / TEXEL_MM);
     for (int row = begin; row < end; row++)
         for (int column = 0; column < N; column++) {
-            weft_cloth_texel *const texel = texel_at(l->cloth, row, column);
+            weft_fabric_texel *const texel = texel_at(l->cloth, row, column);
             texel->slope_x = scale * (texel_at(l->cloth, row, column + 1)->height -
                                       texel_at(l->cloth, row, column - 1)->height);
             texel->slope_y = scale * (texel_at(l->cloth, row + 1, column)->height -
@@ -272,7 +272,7 @@ static void slope_rows(void *context, int band, int begin, int end)
 
 /* Cosine-weighted share of the sky above the horizon of eight directions, seen by a level patch:
    1 - mean sin^2(horizon elevation). */
-static double openness_at(const weft_cloth *cloth, int row, int column)
+static double openness_at(const weft_fabric *cloth, int row, int column)
 {
     static const double step_mm[] = {0.06, 0.12, 0.2, 0.3, 0.45, 0.65, 0.9, 1.3, 1.9};
     const double here = texel_at(cloth, row, column)->height;
@@ -317,7 +317,7 @@ static void spread_openness_rows(void *context, int band, int begin, int end)
 }
 
 /* Brings the mean height to 0 and gathers the extremes and the share of each dye. */
-static void level(weft_cloth *cloth)
+static void level(weft_fabric *cloth)
 {
     const size_t n = (size_t)N * N;
     double sum = 0;
@@ -327,7 +327,7 @@ static void level(weft_cloth *cloth)
     cloth->lowest_mm = 1e9F;
     cloth->highest_mm = -1e9F;
     for (size_t i = 0; i < n; i++) {
-        weft_cloth_texel *const texel = &cloth->texels[i];
+        weft_fabric_texel *const texel = &cloth->texels[i];
         texel->height -= mean;
         cloth->lowest_mm = fminf(cloth->lowest_mm, texel->height);
         cloth->highest_mm = fmaxf(cloth->highest_mm, texel->height);
@@ -335,18 +335,18 @@ static void level(weft_cloth *cloth)
     }
 }
 
-static void find_steepest(weft_cloth *cloth)
+static void find_steepest(weft_fabric *cloth)
 {
     float steepest2 = 0;
     for (size_t i = 0; i < (size_t)N * N; i++) {
-        const weft_cloth_texel *const t = &cloth->texels[i];
+        const weft_fabric_texel *const t = &cloth->texels[i];
         steepest2 = fmaxf(steepest2, t->slope_x * t->slope_x + t->slope_y * t->slope_y);
     }
     cloth->steepest = sqrtf(steepest2);
 }
 
 /* The long waves in which the fabric lies, and its turn on the table. */
-static void lay_down(weft_cloth *cloth, uint64_t seed)
+static void lay_down(weft_fabric *cloth, uint64_t seed)
 {
     const double turn = 0.03 * (2 * weft_rig_random(seed, STREAM_WAVE, 0) - 1);
     cloth->turn_cos = (float)cos(turn);
@@ -385,10 +385,10 @@ static yarn_system make_system(const weft_weave *weave, bool is_warp)
     return system;
 }
 
-weft_err weft_cloth_init(weft_cloth *cloth, const weft_weave *weave, uint64_t seed, weft_error *err)
+weft_err weft_fabric_init(weft_fabric *cloth, const weft_weave *weave, uint64_t seed, weft_error *err)
 {
     weft_err status = WEFT_ERR_NOMEM;
-    *cloth = (weft_cloth){.weave = weave};
+    *cloth = (weft_fabric){.weave = weave};
     loom *const l = weft_alloc(1, sizeof *l, err);
     float *const openness = weft_alloc((size_t)COARSE * COARSE, sizeof *openness, err);
     cloth->texels = weft_alloc((size_t)N * N, sizeof *cloth->texels, err);
@@ -423,13 +423,13 @@ out:
     weft_free(openness);
     weft_free(l);
     if (status != WEFT_OK)
-        weft_cloth_fini(cloth);
+        weft_fabric_fini(cloth);
     return status;
 }
 
-void weft_cloth_fini(weft_cloth *cloth)
+void weft_fabric_fini(weft_fabric *cloth)
 {
     weft_free(cloth->texels);
     weft_free(cloth->height);
-    *cloth = (weft_cloth){0};
+    *cloth = (weft_fabric){0};
 }

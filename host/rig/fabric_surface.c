@@ -1,6 +1,6 @@
 /* Where rays meet a fabric: the inner loop of the renderer. */
 #include "core/clones.h"
-#include "host/rig/cloth.h"
+#include "host/rig/fabric.h"
 
 #include <stddef.h>
 
@@ -9,15 +9,15 @@
 /* Makes coordinates positive before they are cut to whole texels: 64 periods are more than any field. */
 #define OFFSET (64 * WEFT_CLOTH_TEXELS)
 
-weft_cloth_patch weft_cloth_patch_at(const weft_cloth *cloth, float x, float y)
+weft_fabric_patch weft_fabric_patch_at(const weft_fabric *cloth, float x, float y)
 {
     const float c = cloth->turn_cos, s = cloth->turn_sin;
-    weft_cloth_patch p = {.x0 = x,
-                          .y0 = y,
-                          .at = {c * x + s * y, c * y - s * x},
-                          .jacobian = {c, s, -s, c},
-                          .gain = 1,
-                          .strength = 1};
+    weft_fabric_patch p = {.x0 = x,
+                           .y0 = y,
+                           .at = {c * x + s * y, c * y - s * x},
+                           .jacobian = {c, s, -s, c},
+                           .gain = 1,
+                           .strength = 1};
     for (int term = 0; term < 3; term++) {
         const float *const k = cloth->wave_k[term];
         const float phase = k[0] * x + k[1] * y;
@@ -47,7 +47,7 @@ static inline int split(float mm, float *fraction)
     return i & MASK;
 }
 
-static inline float height_at(const weft_cloth *cloth, float x_mm, float y_mm)
+static inline float height_at(const weft_fabric *cloth, float x_mm, float y_mm)
 {
     float fx, fy;
     const int i = split(x_mm, &fx), j = split(y_mm, &fy);
@@ -59,13 +59,13 @@ static inline float height_at(const weft_cloth *cloth, float x_mm, float y_mm)
     return a + fy * (b - a);
 }
 
-static void fill_point(const weft_cloth *cloth, const weft_cloth_patch *patch, weft_cloth_point *point)
+static void fill_point(const weft_fabric *cloth, const weft_fabric_patch *patch, weft_fabric_point *point)
 {
     float fx, fy;
     const int i = split(point->tile_x, &fx), j = split(point->tile_y, &fy);
     const int i1 = (i + 1) & MASK, j1 = (j + 1) & MASK;
-    const weft_cloth_texel *const top = cloth->texels + (size_t)j * WEFT_CLOTH_TEXELS;
-    const weft_cloth_texel *const bottom = cloth->texels + (size_t)j1 * WEFT_CLOTH_TEXELS;
+    const weft_fabric_texel *const top = cloth->texels + (size_t)j * WEFT_CLOTH_TEXELS;
+    const weft_fabric_texel *const bottom = cloth->texels + (size_t)j1 * WEFT_CLOTH_TEXELS;
     const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
     const float h =
         w00 * top[i].height + w01 * top[i1].height + w10 * bottom[i].height + w11 * bottom[i1].height;
@@ -77,7 +77,7 @@ static void fill_point(const weft_cloth *cloth, const weft_cloth_patch *patch, w
     point->height = patch->gain * h;
     point->slope_x = patch->gain * (J[0] * sx + J[2] * sy) + h * patch->gain_dx;
     point->slope_y = patch->gain * (J[1] * sx + J[3] * sy) + h * patch->gain_dy;
-    const weft_cloth_texel *const near = (fy < 0.5F ? top : bottom) + (fx < 0.5F ? i : i1);
+    const weft_fabric_texel *const near = (fy < 0.5F ? top : bottom) + (fx < 0.5F ? i : i1);
     point->dye = near->dye;
     point->strength = patch->strength * (0.75F + (float)near->strength * (1 / 510.0F));
     point->openness = (float)near->openness * (1 / 255.0F);
@@ -89,8 +89,8 @@ static void fill_point(const weft_cloth *cloth, const weft_cloth_patch *patch, w
     point->fibre_y = dy * scale;
 }
 
-void weft_cloth_meet(const weft_cloth *cloth, const weft_cloth_patch *patch, float x, float y, float dx,
-                     float dy, weft_cloth_point *point)
+void weft_fabric_meet(const weft_fabric *cloth, const weft_fabric_patch *patch, float x, float y, float dx,
+                      float dy, weft_fabric_point *point)
 {
     const float *const J = patch->jacobian;
     const float x_rel = x - patch->x0, y_rel = y - patch->y0;
@@ -151,9 +151,9 @@ static inline __attribute__((always_inline)) int march_step(const float *restric
     return walking;
 }
 
-WEFT_CLONES void weft_cloth_see(const weft_cloth *cloth, const weft_cloth_patch *patch,
-                                const weft_cloth_point *point, const float lx[LANES], const float ly[LANES],
-                                const float lz[LANES], float visible[LANES])
+WEFT_CLONES void weft_fabric_see(const weft_fabric *cloth, const weft_fabric_patch *patch,
+                                 const weft_fabric_point *point, const float lx[LANES], const float ly[LANES],
+                                 const float lz[LANES], float visible[LANES])
 {
     const float *const J = patch->jacobian;
     const float steepest = 1.1F * cloth->steepest, h0 = point->height / patch->gain;
