@@ -83,7 +83,7 @@ done
 for sample in "${samples[@]}"; do
     stage "preview $sample" "$weft" preview "$out/$sample.maps" -o "$out/pictures/$sample-plane.png" --light 135,35
     stage "sphere $sample" "$weft" preview "$out/$sample.maps" -o "$out/pictures/$sample-sphere.png" --shape sphere --light 135,45
-    stage "contact $sample" "$weft" contact "$out/$sample.maps" -o "$out/pictures/$sample-contact.png"
+    stage "contact $sample" "$weft" contact "$out/sets/$sample.set" "$out/$sample.maps" -o "$out/pictures/$sample-contact.png"
 done
 for sample in "${samples[@]}"; do
     "$weft" compare "$out/$sample.maps" "$out/truth/$sample/plane.maps" --json >"$out/compare-$sample.json"
