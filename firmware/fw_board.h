@@ -31,6 +31,29 @@ void fw_board_light(uint16_t mask, uint16_t level);
 uint32_t fw_board_ticks(void);
 uint16_t fw_board_ms(void);
 
+/** The trigger line to the camera. */
+void fw_board_trigger(bool high);
+
+/** Lets edges of the exposure line come to fw_sequence_on_exposure(), or not. */
+void fw_board_watch_exposure(bool on);
+/** Whether the exposure line is high. */
+bool fw_board_is_exposing(void);
+
+/** Calls fw_sequence_on_alarm() from an interrupt: `ticks` from now, or from when the last alarm was due.
+ *  One that is due already rings at once, and what comes after it
+ *  counts from then. */
+void fw_board_alarm_begin(uint32_t ticks);
+void fw_board_alarm_after(uint32_t ticks);
+void fw_board_alarm_stop(void);
+
+/** Bytes that stay without power.  Writing takes 3.4 ms unless the byte is the same; the watchdog is fed. */
+uint8_t fw_board_eeprom_read(uint16_t address);
+void fw_board_eeprom_write(uint16_t address, uint8_t byte);
+
+/** From now on the loop may do what it likes: the watchdog resets the board, and the next start knows that
+ *  it was asked for. */
+void fw_board_reboot(void);
+
 /** Says that there are bytes to send: the board asks fw_link_next_byte() from its interrupt. */
 void fw_board_send(void);
 

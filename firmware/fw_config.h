@@ -5,7 +5,7 @@
 #define WEFT_FIRMWARE_FW_CONFIG_H
 
 #define FW_VERSION_MAJOR 1
-#define FW_VERSION_MINOR 0
+#define FW_VERSION_MINOR 1
 #define FW_VERSION_PATCH 0
 
 #define FW_TEXT_(x)      #x
@@ -37,7 +37,8 @@
  *  10 ms exposure that is not in step with it errs by at most 0.16 %. */
 #define FW_LEVEL_MAX 256
 
-/** ms; longest that one LIGHT may keep lights on.  Longer light means that the host is there to ask again. */
+/** ms; longest that one LIGHT or step may keep lights on, whatever the settings say.  Longer light means that
+ * the host is there to ask again. */
 #define FW_MAX_ON_MS 2000
 
 /** ms; range of leases.  Shorter than 100 trips on an ordinary computer's pauses, longer than 5 s is no
@@ -54,14 +55,36 @@
 #define FW_RX_RING 128
 #define FW_TX_RING 128
 
-/** Longest sequence; sequences are not in this version. */
-#define FW_MAX_STEPS 0
+/** us of a tick; a power of two, so that dividing by it is a shift. */
+#define FW_US_A_TICK 4
+
+/** Longest sequence: ten lights, a dark frame and some to spare, in 20 bytes of RAM each. */
+#define FW_MAX_STEPS 16
+
+/** Steps that have ended, or run, and that the host has not been told of; a power of two. */
+#define FW_STEP_RING 4
+
+/** us; ranges of a step's times.  Settling and pulse are kept in 16 bits of ticks; a shorter hold than 100
+ *  would end before its own edges are done. */
+#define FW_SETTLE_MAX_US 250000ul
+#define FW_HOLD_MIN_US   100
+#define FW_PULSE_MIN_US  20
+#define FW_GAP_MAX_US    10000000ul
+
+/** From SEQ_RUN to the first lights. */
+#define FW_START_TICKS 25
 
 /* -- impossible choices -------------------------------------------------------------------------------- */
 
 #define FW_REAL_BAUD (FW_CPU_HZ / (8 * (FW_UBRR + 1)))
 #if FW_REAL_BAUD * 200 > FW_BAUD * 201 || FW_REAL_BAUD * 200 < FW_BAUD * 199
 #error "FW_BAUD is more than 0.5 % off with this crystal: take 500000, 250000 or 38400"
+#endif
+#if FW_US_A_TICK * FW_TICK_HZ != 1000000 || FW_STEP_RING & (FW_STEP_RING - 1)
+#error "a tick must be a power of two of microseconds, the ring of steps a power of two long"
+#endif
+#if FW_SETTLE_MAX_US / FW_US_A_TICK > 65535 || FW_MAX_STEPS > 64
+#error "settling and trigger pulses are kept in 16 bits of ticks"
 #endif
 #if FW_RX_RING & (FW_RX_RING - 1) || FW_TX_RING & (FW_TX_RING - 1) || FW_RX_RING > 128 || FW_TX_RING > 128
 #error "the rings are indexed by masking a byte: powers of two up to 128"

@@ -3,6 +3,7 @@
 #include "firmware/fw_board.h"
 #include "firmware/fw_config.h"
 #include "firmware/fw_safety.h"
+#include "firmware/fw_settings.h"
 
 static struct {
     uint16_t mask, level;
@@ -29,11 +30,12 @@ bool fw_light_set(uint16_t mask, uint16_t level, uint16_t max_on_ms)
         fw_light_off();
         return !fw_safety_panicked();
     }
+    const uint16_t trimmed = fw_settings_trim(mask, level);
     const uint8_t was = fw_board_lock();
     const bool allowed = !fw_safety_panicked();
     const bool same = mask == light.mask && level == light.level;
     if (allowed && !same)
-        fw_board_light(mask, level);
+        fw_board_light(mask, trimmed);
     fw_board_unlock(was);
     if (!allowed)
         return false;

@@ -112,6 +112,12 @@ static void send(const uint8_t *bytes, uint8_t n)
     fw_board_send();
 }
 
+bool fw_link_has_room(uint8_t n)
+{
+    const uint8_t used = (uint8_t)(tx.head - tx.tail) & (FW_TX_RING - 1);
+    return n + (WEFT_FRAME_WIRE_MAX - WEFT_PAYLOAD_MAX) <= FW_TX_RING - 1 - used;
+}
+
 void fw_link_send_event(uint8_t number, const uint8_t *payload, uint8_t n)
 {
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
@@ -179,7 +185,7 @@ static void take_frame(void)
 static void introduce_myself(void)
 {
     static const char text[] = "Weft light controller " FW_VERSION_TEXT " (" FW_GIT_ID
-                               "), protocol " FW_PROTOCOL_TEXT ", 10 lights\r\n";
+                               "), protocol " FW_PROTOCOL_TEXT ", up to 10 lights\r\n";
     send((const uint8_t *)text, sizeof text - 1);
 }
 

@@ -27,6 +27,9 @@ void fw_link_poll(void);
 /** Forgets the bytes that came before the last panic; from the loop, through fw_safety_poll(). */
 void fw_link_discard(void);
 
+/** Whether an event with n bytes of payload can be sent now. */
+bool fw_link_has_room(uint8_t n);
+
 /** Sends an event; dropped when there is no room, which its number shows to the host. */
 void fw_link_send_event(uint8_t number, const uint8_t *payload, uint8_t n);
 

@@ -4,6 +4,7 @@
 #include "firmware/fw_config.h"
 #include "firmware/fw_light.h"
 #include "firmware/fw_link.h"
+#include "firmware/fw_sequence.h"
 #include "firmware/protocol.h"
 
 static struct {
@@ -46,6 +47,8 @@ uint32_t fw_safety_boot_nonce(void)
 
 static void latch(uint8_t cause)
 {
+    fw_sequence_stop();
+    fw_sequence_forgive();
     fw_light_off();
     safety.lease_ms = 0;
     safety.hello = false;
@@ -134,7 +137,11 @@ uint8_t fw_safety_state(void)
         return WEFT_STATE_SAFE;
     if (safety.lease_ms == 0)
         return WEFT_STATE_BOOT;
-    return fw_light_mask() ? WEFT_STATE_LIT : WEFT_STATE_IDLE;
+    if (fw_sequence_is_running())
+        return WEFT_STATE_RUNNING;
+    if (fw_light_mask())
+        return WEFT_STATE_LIT;
+    return fw_sequence_has_failed() ? WEFT_STATE_FAULT : WEFT_STATE_IDLE;
 }
 
 uint8_t fw_safety_cause(void)

@@ -22,7 +22,7 @@
 #ifndef WEFT_PROTOCOL_MAJOR   /* a test builds firmware of another version */
 #define WEFT_PROTOCOL_MAJOR 1 /* in every frame: the other side refuses another one */
 #endif
-#define WEFT_PROTOCOL_MINOR 0 /* appended fields and commands only */
+#define WEFT_PROTOCOL_MINOR 1 /* appended fields and commands only */
 #define WEFT_PROTOCOL_MAGIC 0x54464557ul
 
 #define WEFT_PAYLOAD_MAX     48
@@ -47,6 +47,10 @@ enum {
 #define WEFT_CAUSE(number, NAME, text)         WEFT_CAUSE_##NAME = (number),
 #define WEFT_RESET(number, NAME, text)         WEFT_RESET_##NAME = (number),
 #define WEFT_SETTINGS(number, NAME, text)      WEFT_SETTINGS_##NAME = (number),
+#define WEFT_FAULT(number, NAME, text)         WEFT_FAULT_##NAME = (number),
+#define WEFT_STEP(bit, NAME, text)             WEFT_STEP_##NAME = 1 << (bit),
+#define WEFT_HOLD(number, NAME, text)          WEFT_HOLD_##NAME = (number),
+#define WEFT_KEY(number, NAME, text)           WEFT_KEY_##NAME = (number),
 #define WEFT_CAPABILITY(bit, NAME, text)       WEFT_CAPABILITY_##NAME = 1 << (bit),
 #include "firmware/protocol.def"
 };

@@ -99,6 +99,18 @@ static void print_numbers(void)
     print_head("States of the settings");
 #define WEFT_SETTINGS ROW
 #include "firmware/protocol.def"
+    print_head("Why a sequence fails");
+#define WEFT_FAULT ROW
+#include "firmware/protocol.def"
+    print_head("What ends a step");
+#define WEFT_HOLD ROW
+#include "firmware/protocol.def"
+    print_head("Settings");
+#define WEFT_KEY ROW
+#include "firmware/protocol.def"
+    printf("\n### Flags of a step\n\n| bit | name | meaning |\n| ---: | --- | --- |\n");
+#define WEFT_STEP ROW
+#include "firmware/protocol.def"
     printf("\n### Capability bits\n\n| bit | name | meaning |\n| ---: | --- | --- |\n");
 #define WEFT_CAPABILITY ROW
 #include "firmware/protocol.def"
@@ -112,9 +124,9 @@ static void print_tables(void)
         "\n### Limits\n\n| what | value |\n| --- | ---: |\n"
         "| line | %lu bits/s, 8N1 |\n| payload | 0 to %d bytes |\n| frame on the line | at most %d bytes |\n"
         "| lights | %d |\n| full level | %d |\n| tick | %lu Hz |\n| longest light | %d ms |\n"
-        "| lease | %d to %d ms |\n| receive window | %d bytes |\n",
+        "| steps of a sequence | %d |\n| lease | %d to %d ms |\n| receive window | %d bytes |\n",
         FW_BAUD, WEFT_PAYLOAD_MAX, WEFT_FRAME_WIRE_MAX, FW_N_LIGHTS, FW_LEVEL_MAX, FW_TICK_HZ, FW_MAX_ON_MS,
-        FW_LEASE_MIN_MS, FW_LEASE_MAX_MS, FW_RX_RING - 1);
+        FW_MAX_STEPS, FW_LEASE_MIN_MS, FW_LEASE_MAX_MS, FW_RX_RING - 1);
     print_commands();
     print_numbers();
     putchar('\n');

@@ -20,8 +20,9 @@
 #define AVR_PORTD_OF(mask) ((uint8_t)((mask) << 2))
 #define AVR_PORTC_OF(mask) ((uint8_t)((mask) >> 6 & AVR_LIGHTS_C))
 
-#define AVR_DIMMING (1 << 1) /* of PORTB */
-#define AVR_TRIGGER (1 << 2)
-#define AVR_STATUS  (1 << 5)
+#define AVR_DIMMING  (1 << 1) /* of PORTB */
+#define AVR_EXPOSURE (1 << 0)
+#define AVR_TRIGGER  (1 << 2)
+#define AVR_STATUS   (1 << 5)
 
 #endif

@@ -19,18 +19,30 @@ typedef struct sim_board {
     int lit;      /* calls of fw_board_light() */
     int locked;   /* depth */
     int fed;      /* calls of fw_board_watchdog_feed() */
-    bool stalled; /* the line takes no bytes */
+    bool trigger, watching, exposing;
+    bool alarm;          /* is set */
+    uint32_t alarm_tick; /* when */
+    bool rebooting;
+    int eeprom_writes_left; /* until the power goes, in the middle of the next one; -1: it stays */
+    bool stalled;           /* the line takes no bytes */
     size_t sent;
     uint8_t wire[4096]; /* what was sent */
 } sim_board;
 
 extern sim_board sim;
 
+enum { SIM_EEPROM_BYTES = 1024 };
+/** Stays over sim_board_start(). */
+extern uint8_t sim_eeprom[SIM_EEPROM_BYTES];
+
 /** A reset: variables of the firmware as after power-on, the board dark, time 0. */
 void sim_board_start(void);
 
 /** One turn of the firmware's loop. */
 void sim_board_turn(void);
+
+/** The exposure line changes; the firmware sees it when it watches. */
+void sim_board_expose(bool high);
 
 /** Time passes, with one turn of the loop a millisecond. */
 void sim_board_pass_ms(int ms);

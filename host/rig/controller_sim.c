@@ -1,6 +1,9 @@
 #include "host/rig/controller_sim_private.h"
 
+#include <simavr/avr_eeprom.h>
+
 #include <assert.h>
+#include <string.h>
 
 /* Data addresses of the ATmega328P's registers (DS40002061B, section 30). */
 enum { R_UCSR0A = 0xc0, R_UBRR0L = 0xc4, R_UBRR0H = 0xc5, U2X0 = 0x02 };
@@ -77,6 +80,98 @@ void weft_controller_sim_set_trigger(weft_controller_sim *sim, void (*on_trigger
     sim->on_trigger = on_trigger;
     sim->trigger_context = context;
     pthread_mutex_unlock(&sim->mutex);
+}
+
+void weft_controller_sim_set_watch(weft_controller_sim *sim,
+                                   void (*on_change)(void *context, uint64_t cycle, uint32_t lights,
+                                                     bool trigger),
+                                   void *context)
+{
+    pthread_mutex_lock(&sim->mutex);
+    sim->on_change = on_change;
+    sim->change_context = context;
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+void weft_controller_sim_set_camera(weft_controller_sim *sim, uint32_t delay_us, uint32_t exposure_us)
+{
+    pthread_mutex_lock(&sim->mutex);
+    sim->camera_delay_us = delay_us;
+    sim->camera_exposure_us = exposure_us;
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high)
+{
+    pthread_mutex_lock(&sim->mutex);
+    weft_sim_set_exposure_line(sim, high);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+/* The two ioctls work and say that they do not: their value is of no use. */
+void weft_controller_sim_read_eeprom(weft_controller_sim *sim, uint8_t bytes[1024])
+{
+    avr_eeprom_desc_t all = {.ee = bytes, .size = 1024};
+    pthread_mutex_lock(&sim->mutex);
+    avr_ioctl(sim->avr, AVR_IOCTL_EEPROM_GET, &all);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+void weft_controller_sim_write_eeprom(weft_controller_sim *sim, const uint8_t bytes[1024])
+{
+    uint8_t copy[1024];
+    avr_eeprom_desc_t all = {.ee = copy, .size = 1024};
+    memcpy(copy, bytes, sizeof copy);
+    pthread_mutex_lock(&sim->mutex);
+    avr_ioctl(sim->avr, AVR_IOCTL_EEPROM_SET, &all);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+void weft_controller_sim_power_cycle(weft_controller_sim *sim)
+{
+    pthread_mutex_lock(&sim->mutex);
+    memset(sim->avr->data + sim->avr->ioend + 1, 0x5a, sim->avr->ramend - sim->avr->ioend);
+    weft_sim_press_reset(sim);
+    avr_regbit_clear(sim->avr, sim->avr->reset_flags.extrf);
+    avr_regbit_set(sim->avr, sim->avr->reset_flags.porf);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+/* -- measuring the program ------------------------------------------------------------------------------ */
+
+enum { PAINT = 0xc5 };
+
+bool weft_controller_sim_paint_stack(weft_controller_sim *sim)
+{
+    pthread_mutex_lock(&sim->mutex);
+    const uint32_t top = (uint32_t)sim->avr->data[R_SPH] << 8 | sim->avr->data[R_SPL];
+    const bool known = sim->ram_free != 0 && sim->ram_free < top;
+    if (known)
+        memset(sim->avr->data + sim->ram_free, PAINT, top - sim->ram_free);
+    pthread_mutex_unlock(&sim->mutex);
+    return known;
+}
+
+void weft_controller_sim_measure_stack(weft_controller_sim *sim, int *used, int *untouched)
+{
+    pthread_mutex_lock(&sim->mutex);
+    uint32_t deepest = sim->ram_free;
+    while (deepest < sim->avr->ramend && sim->avr->data[deepest] == PAINT)
+        deepest++;
+    *used = (int)(sim->avr->ramend + 1 - deepest);
+    *untouched = (int)(deepest - sim->ram_free);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+unsigned weft_controller_sim_longest_lock(weft_controller_sim *sim)
+{
+    pthread_mutex_lock(&sim->mutex);
+    const unsigned longest = (unsigned)sim->longest_lock;
+    sim->watch_lock = true;
+    sim->longest_lock = 0;
+    sim->locked_since = 0;
+    pthread_mutex_unlock(&sim->mutex);
+    return longest;
 }
 
 double weft_controller_sim_time_s(weft_controller_sim *sim)

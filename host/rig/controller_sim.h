@@ -64,6 +64,37 @@ void weft_controller_sim_hang(weft_controller_sim *sim);
 void weft_controller_sim_set_trigger(weft_controller_sim *sim, void (*on_trigger)(void *context),
                                      void *context);
 
+/** Called from the simulator's thread whenever lights or trigger change, with the cycle of the 16 MHz clock.
+ */
+void weft_controller_sim_set_watch(weft_controller_sim *sim,
+                                   void (*on_change)(void *context, uint64_t cycle, uint32_t lights,
+                                                     bool trigger),
+                                   void *context);
+
+/** A camera on trigger and exposure line: `delay_us` after each rise of the trigger the line rises, for
+ *  exposure_us; 0: no camera, the line stays low. */
+void weft_controller_sim_set_camera(weft_controller_sim *sim, uint32_t delay_us, uint32_t exposure_us);
+
+/** The exposure line by hand. */
+void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high);
+
+/** The EEPROM, 1024 bytes: a copy of it, or other contents. */
+void weft_controller_sim_read_eeprom(weft_controller_sim *sim, uint8_t bytes[1024]);
+void weft_controller_sim_write_eeprom(weft_controller_sim *sim, const uint8_t bytes[1024]);
+
+/** Power goes and comes back: RAM is lost, the EEPROM stays.  (A reset keeps both.) */
+void weft_controller_sim_power_cycle(weft_controller_sim *sim);
+
+/** Fills the free RAM between variables and stack with a pattern; then, later: the deepest that the stack
+ *  has been since, in bytes from the end of RAM, and the bytes that were never touched.
+ *  @return false for an ELF without the symbol _end */
+bool weft_controller_sim_paint_stack(weft_controller_sim *sim);
+void weft_controller_sim_measure_stack(weft_controller_sim *sim, int *used, int *untouched);
+
+/** From now on every instruction is looked at (100 times slower): gives the longest time that interrupts
+ *  have been off since the last call, in cycles. */
+unsigned weft_controller_sim_longest_lock(weft_controller_sim *sim);
+
 /** Simulated seconds since power came on. */
 double weft_controller_sim_time_s(weft_controller_sim *sim);
 

@@ -4,6 +4,7 @@
 #include "host/rig/controller_sim_private.h"
 
 #include <simavr/avr_extint.h>
+#include <simavr/avr_timer.h>
 #include <simavr/sim_elf.h>
 
 #include <assert.h>
@@ -15,6 +16,8 @@
 enum {
     R_MCUSR = 0x54,
     R_WDTCSR = 0x60,
+    R_TIMSK1 = 0x6f,
+    R_TIMSK2 = 0x70,
     WDRF = 0x08, /* of MCUSR: the watchdog made this reset */
     WDE = 0x08,  /* of WDTCSR */
     WDCE = 0x10, /* of WDTCSR: lets the next write change it */
@@ -100,6 +103,8 @@ static void mend_after_reset(weft_controller_sim *sim)
     for (uint8_t i = 0; i < 2; i++) /* or it polls INT0 and INT1, lights of ours, at every cycle */
         avr_extint_set_strict_lvl_trig(sim->avr, i, 0);
     weft_sim_look_at_pins(sim);
+    if (sim->exposing)
+        weft_sim_set_exposure_line(sim, false); /* its timer is gone */
     keep_watchdog_on(sim->avr);
     sim->feeding = false;
     weft_sim_start_feeding(sim);
@@ -127,6 +132,20 @@ static avr_cycle_count_t no_action(avr_t *avr, avr_cycle_count_t when, void *con
     return 0;
 }
 
+/* Interrupts are off from the instruction that clears I to the one that sets it, or to the end of an
+ * interrupt's function. */
+static void watch_lock(weft_controller_sim *sim)
+{
+    const avr_t *const avr = sim->avr;
+    if (avr->sreg[S_I]) {
+        sim->locked_since = 0;
+    } else if (sim->locked_since == 0) {
+        sim->locked_since = avr->cycle;
+    } else if (avr->cycle - sim->locked_since > sim->longest_lock) {
+        sim->longest_lock = avr->cycle - sim->locked_since;
+    }
+}
+
 /* Runs to `until` and not beyond: a timer there ends a sleep. */
 void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until)
 {
@@ -136,7 +155,11 @@ void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until)
         if (!armed)
             avr_cycle_timer_register(avr, until - avr->cycle, no_action, sim);
         armed = true;
+        if (sim->watch_lock)
+            avr->run_cycle_count = 1; /* one instruction at a time */
         const int state = avr_run(avr);
+        if (sim->watch_lock)
+            watch_lock(sim);
         sim->crashed = state == cpu_Done || state == cpu_Crashed;
         if (sim->was_reset) {
             mend_after_reset(sim);
@@ -181,7 +204,8 @@ static weft_err check_elf(const char *path, weft_error *err)
     return WEFT_OK;
 }
 
-static weft_err load_elf(avr_t *avr, const char *path, weft_error *err)
+/* `ram_free` gets the end of the program's variables; 0 when the file does not say. */
+static weft_err load_elf(avr_t *avr, const char *path, uint32_t *ram_free, weft_error *err)
 {
     elf_firmware_t elf;
     memset(&elf, 0, sizeof elf);
@@ -191,8 +215,12 @@ static weft_err load_elf(avr_t *avr, const char *path, weft_error *err)
         elf.frequency = WEFT_SIM_CLOCK_HZ;
         avr_load_firmware(avr, &elf);
     }
-    for (uint32_t i = 0; i < elf.symbolcount; i++)
+    *ram_free = 0;
+    for (uint32_t i = 0; i < elf.symbolcount; i++) {
+        if (strcmp(elf.symbol[i]->symbol, "_end") == 0)
+            *ram_free = elf.symbol[i]->addr & 0xffff;
         free(elf.symbol[i]);
+    }
     free(elf.symbol);
     free(elf.flash);
     free(elf.eeprom);
@@ -200,6 +228,31 @@ static weft_err load_elf(avr_t *avr, const char *path, weft_error *err)
         return weft_fail(err, WEFT_ERR_FORMAT, "%s: the firmware is damaged or does not fit the ATmega328P",
                          path);
     return WEFT_OK;
+}
+
+static avr_timer_t *find_timer(avr_t *avr, char name)
+{
+    avr_io_t *io = avr->io_port;
+    while (io && !(strcmp(io->kind, "timer") == 0 && ((avr_timer_t *)io)->name == name))
+        io = io->next;
+    return (avr_timer_t *)io;
+}
+
+/* On the chip an interrupt whose flag was raised while it was masked comes when it is let in; the simulator
+ * forgets it. */
+static void recall(avr_t *avr, avr_int_vector_t *vector)
+{
+    if (avr_regbit_get(avr, vector->enable) && avr_regbit_get(avr, vector->raised) && !vector->pending)
+        avr_raise_interrupt(avr, vector);
+}
+
+static void on_timer_mask_written(avr_irq_t *irq, uint32_t value, void *context)
+{
+    weft_controller_sim *const sim = context;
+    (void)irq;
+    (void)value;
+    recall(sim->avr, &find_timer(sim->avr, '1')->icr);
+    recall(sim->avr, &find_timer(sim->avr, '2')->comp[AVR_TIMER_COMPA].interrupt);
 }
 
 static avr_uart_t *find_uart(avr_t *avr)
@@ -226,6 +279,10 @@ static void connect_board(weft_controller_sim *sim)
                             sim);
     sim->uart_input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     weft_sim_watch_pins(sim);
+    avr_irq_register_notify(avr_iomem_getirq(avr, R_TIMSK1, NULL, AVR_IOMEM_IRQ_ALL), on_timer_mask_written,
+                            sim);
+    avr_irq_register_notify(avr_iomem_getirq(avr, R_TIMSK2, NULL, AVR_IOMEM_IRQ_ALL), on_timer_mask_written,
+                            sim);
     avr_reset(avr);
     mend_after_reset(sim);
     avr_regbit_set(avr, avr->reset_flags.porf);
@@ -249,7 +306,7 @@ weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controlle
     if (status == WEFT_OK) {
         avr_init(sim->avr);
         sim->avr->log = LOG_ERROR;
-        status = load_elf(sim->avr, elf_path, err);
+        status = load_elf(sim->avr, elf_path, &sim->ram_free, err);
     }
     if (status == WEFT_OK) {
         connect_board(sim);

@@ -1,6 +1,8 @@
 /* What the pins of the simulated board give as light, and what an exposure sees of it. */
 #include "host/rig/controller_sim_private.h"
 
+#include <simavr/avr_ioport.h>
+
 #include <string.h>
 
 /* Data addresses of the ATmega328P's registers (DS40002061B, section 30). */
@@ -54,6 +56,21 @@ static unsigned dimming_duty(const uint8_t *r)
     return r[R_OCR1AL] + 1u;
 }
 
+void weft_sim_set_exposure_line(weft_controller_sim *sim, bool high)
+{
+    sim->exposing = high;
+    avr_raise_irq(avr_io_getirq(sim->avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 0), high);
+}
+
+/* The camera begins its exposure, or ends it. */
+static avr_cycle_count_t move_exposure_line(avr_t *avr, avr_cycle_count_t when, void *context)
+{
+    weft_controller_sim *const sim = context;
+    (void)avr;
+    weft_sim_set_exposure_line(sim, !sim->exposing);
+    return sim->exposing ? when + (avr_cycle_count_t)sim->camera_exposure_us * WEFT_SIM_CYCLES_A_US : 0;
+}
+
 /* Reads the pins from the registers, at every write to one of them.  A light shines while its own pin and
  * the dimming line are driven high; what is not driven is pulled down. */
 void weft_sim_look_at_pins(weft_controller_sim *sim)
@@ -62,6 +79,8 @@ void weft_sim_look_at_pins(weft_controller_sim *sim)
     const unsigned d = r[R_PORTD] & r[R_DDRD], c = r[R_PORTC] & r[R_DDRC], duty = dimming_duty(r);
     const uint32_t chosen = d >> LIGHTS_D_SHIFT | (c & LIGHTS_C_MASK) << N_LIGHTS_D;
     const uint32_t lights = duty ? chosen : 0;
+    const bool trigger = (r[R_PORTB] & r[R_DDRB] & TRIGGER_B) != 0;
+    const bool changes = lights != sim->lights || trigger != sim->trigger_high;
     if (lights != sim->lights || duty != sim->duty) {
         count_light_until(sim, sim->avr->cycle);
         if (lights == 0 && sim->lights != 0)
@@ -72,9 +91,13 @@ void weft_sim_look_at_pins(weft_controller_sim *sim)
         if (n > sim->most_lights)
             sim->most_lights = n;
     }
-    const bool trigger = (r[R_PORTB] & r[R_DDRB] & TRIGGER_B) != 0;
     const bool rises = trigger && !sim->trigger_high;
     sim->trigger_high = trigger;
+    if (changes && sim->on_change)
+        sim->on_change(sim->change_context, sim->avr->cycle, lights, trigger);
+    if (rises && sim->camera_exposure_us)
+        avr_cycle_timer_register(sim->avr, 1 + (avr_cycle_count_t)sim->camera_delay_us * WEFT_SIM_CYCLES_A_US,
+                                 move_exposure_line, sim);
     if (rises && sim->on_trigger)
         sim->on_trigger(sim->trigger_context);
 }

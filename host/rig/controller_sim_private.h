@@ -56,6 +56,15 @@ struct weft_controller_sim {
     void (*on_trigger)(void *context);
     void *trigger_context;
 
+    void (*on_change)(void *context, uint64_t cycle, uint32_t lights, bool trigger);
+    void *change_context;
+    uint32_t camera_delay_us, camera_exposure_us; /* 0: no camera */
+    bool exposing;
+
+    uint32_t ram_free; /* first address behind the variables; 0: unknown */
+    bool watch_lock;
+    avr_cycle_count_t locked_since, longest_lock; /* 0: interrupts are on */
+
     weft_sim_queue in, out;
     bool feeding;
     unsigned resets, opened, overruns;
@@ -80,6 +89,8 @@ bool weft_sim_queue_take(weft_sim_queue *q, uint8_t *byte);
 void weft_sim_watch_pins(weft_controller_sim *sim);
 /** Reads them now. */
 void weft_sim_look_at_pins(weft_controller_sim *sim);
+/** The exposure line of the camera. */
+void weft_sim_set_exposure_line(weft_controller_sim *sim, bool high);
 /** An exposure of `exposure_us` from now on, until it is done and forgotten. */
 void weft_sim_begin_exposure(weft_controller_sim *sim, weft_sim_exposure *e, uint32_t exposure_us);
 void weft_sim_forget_exposure(weft_controller_sim *sim, weft_sim_exposure *e);

@@ -82,7 +82,7 @@ static void test_open_light_status_close(void **state)
     weft_controller *const c = open_it(5000);
     const weft_controller_info *const info = weft_controller_get_info(c);
     assert_string_equal(info->port, pty_path);
-    assert_string_equal(info->firmware, "1.0.0");
+    assert_string_equal(info->firmware, "1.1.0");
     assert_string_equal(info->reset_cause, "EXTERNAL"); /* opening pulled DTR */
     assert_int_equal(info->n_lights, 10);
     assert_int_equal(info->level_max, 256);

@@ -1,153 +1,9 @@
 /* The real firmware on a simulated ATmega328P, stepped: what goes in on the line, what the lights do. */
+#include "tests/firmware/talk.h"
 #include "tests/support/support.h"
 
-#include "firmware/fw_config.h"
-#include "firmware/protocol.h"
-#include "host/rig/controller_sim.h"
-
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-static weft_controller_sim *sim;
-static uint8_t seq;
-
-static const char *elf_path(const char *name)
-{
-    static char path[1024];
-    const char *const build = getenv("WEFT_TEST_BUILD");
-    snprintf(path, sizeof path, "%s/%s", build ? build : "build", name);
-    return path;
-}
-
-static int power_on(void **state)
-{
-    (void)state;
-    weft_error error = {0};
-    if (weft_controller_sim_create_stepped(elf_path("firmware/weft-firmware.elf"), &sim, &error) != WEFT_OK) {
-        print_error("%s\n", error.text);
-        return 1;
-    }
-    weft_controller_sim_run(sim, 3000);
-    return 0;
-}
-
-static int power_off(void **state)
-{
-    (void)state;
-    weft_controller_sim_destroy(sim);
-    sim = NULL;
-    return 0;
-}
-
-/* -- talking -------------------------------------------------------------------------------------------- */
-
-static uint8_t request(uint8_t *wire, uint8_t number, uint8_t command, const void *payload, uint8_t n)
-{
-    weft_frame f = {.version = WEFT_PROTOCOL_MAJOR, .seq = number, .command = command, .n = n};
-    memcpy(f.payload, payload, n);
-    return weft_frame_encode(&f, wire);
-}
-
-/* The next frame that comes within `ms`; false when none does. */
-static bool next_frame(weft_frame *f, int ms)
-{
-    uint8_t wire[WEFT_FRAME_WIRE_MAX];
-    size_t n = 0;
-    for (int i = 0; i < ms * 40; i++) {
-        while (n < sizeof wire && weft_controller_sim_receive(sim, wire + n, 1) == 1)
-            if (wire[n++] == 0) {
-                assert_int_equal(weft_frame_decode(wire, n - 1, f), WEFT_FRAME_GOOD);
-                return true;
-            }
-        weft_controller_sim_run(sim, 25);
-    }
-    return false;
-}
-
-/* Sends a command and gives the status of its reply, with the reply's payload in `reply`. */
-static int ask(uint8_t command, const void *payload, uint8_t n, weft_frame *reply)
-{
-    uint8_t wire[WEFT_FRAME_WIRE_MAX];
-    weft_frame f;
-    const uint8_t length = request(wire, ++seq, command, payload, n);
-    weft_controller_sim_send(sim, wire, length);
-    do
-        assert_true(next_frame(reply ? reply : &f, 20));
-    while ((reply ? reply : &f)->type == WEFT_FRAME_EVENT);
-    if (!reply)
-        reply = &f;
-    assert_int_equal(reply->type, WEFT_FRAME_REPLY);
-    assert_int_equal(reply->seq, seq);
-    assert_int_equal(reply->command, command);
-    return reply->payload[0];
-}
-
-static int hello(weft_hello_reply *out)
-{
-    const weft_hello_request h = {.proto_major = 1, .salt = 0x1234567};
-    uint8_t bytes[WEFT_HELLO_REQUEST_BYTES];
-    weft_frame reply;
-    weft_hello_request_encode(&h, bytes);
-    const int status = ask(WEFT_CMD_HELLO, bytes, sizeof bytes, &reply);
-    if (out)
-        weft_hello_reply_decode(reply.payload + 1, (uint8_t)(reply.n - 1), out);
-    return status;
-}
-
-static int lease(uint16_t ms)
-{
-    const weft_lease_request l = {.lease_ms = ms};
-    uint8_t bytes[WEFT_LEASE_REQUEST_BYTES];
-    weft_lease_request_encode(&l, bytes);
-    return ask(WEFT_CMD_LEASE, bytes, sizeof bytes, NULL);
-}
-
-static uint8_t light_request(uint8_t *bytes, uint16_t mask, uint16_t level, uint16_t max_on_ms)
-{
-    const weft_light_request l = {.mask = mask, .level = level, .max_on_ms = max_on_ms};
-    weft_light_request_encode(&l, bytes);
-    return WEFT_LIGHT_REQUEST_BYTES;
-}
-
-static int light(uint16_t mask, uint16_t level, uint16_t max_on_ms)
-{
-    uint8_t bytes[WEFT_LIGHT_REQUEST_BYTES];
-    return ask(WEFT_CMD_LIGHT, bytes, light_request(bytes, mask, level, max_on_ms), NULL);
-}
-
-static weft_status_reply status(void)
-{
-    weft_frame reply;
-    weft_status_reply s;
-    assert_int_equal(ask(WEFT_CMD_STATUS, "", 0, &reply), WEFT_STATUS_OK);
-    weft_status_reply_decode(reply.payload + 1, (uint8_t)(reply.n - 1), &s);
-    return s;
-}
-
-static void take_lease(uint16_t ms)
-{
-    assert_int_equal(hello(NULL), WEFT_STATUS_OK);
-    assert_int_equal(lease(ms), WEFT_STATUS_OK);
-}
-
-static uint32_t lights(void)
-{
-    return weft_controller_sim_lights(sim, NULL);
-}
-
-static double now_ms(void)
-{
-    return 1e3 * weft_controller_sim_time_s(sim);
-}
-
-/* When the lights went off, in ms of simulated time. */
-static double off_at_ms(void)
-{
-    double dark_s;
-    weft_controller_sim_lights(sim, &dark_s);
-    return now_ms() - 1e3 * dark_s;
-}
 
 /* -- tests ---------------------------------------------------------------------------------------------- */
 
@@ -178,8 +34,8 @@ static void test_answers_a_person(void **state)
     weft_controller_sim_send(sim, (const uint8_t *)"AT\r\n?\r\n", 7);
     weft_controller_sim_run(sim, 5000);
     const size_t n = weft_controller_sim_receive(sim, (uint8_t *)text, sizeof text - 1);
-    assert_non_null(strstr(text, "Weft light controller 1.0.0"));
-    assert_non_null(strstr(text, "protocol 1.0"));
+    assert_non_null(strstr(text, "Weft light controller 1.1.0"));
+    assert_non_null(strstr(text, "protocol 1.1"));
     assert_string_equal(text + n - 2, "\r\n");
     assert_ptr_equal(strstr(text, "Weft"), text);
     assert_int_equal(hello(NULL), WEFT_STATUS_OK); /* and is still in step with frames */
@@ -457,9 +313,9 @@ static void test_unknown_and_foreign_commands(void **state)
     (void)state;
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
     weft_frame reply;
-    assert_int_equal(ask(0x20, "", 0, &reply), WEFT_STATUS_BAD_CMD);
+    assert_int_equal(ask(0x2f, "", 0, &reply), WEFT_STATUS_BAD_CMD);
     assert_int_equal(reply.n, 1);
-    assert_int_equal(ask(0x3e, "", 0, NULL), WEFT_STATUS_BAD_CMD);
+    assert_int_equal(ask(0x3f, "", 0, NULL), WEFT_STATUS_BAD_CMD);
     assert_int_equal(ask(WEFT_CMD_LIGHT, "\1", 1, NULL), WEFT_STATUS_BAD_ARG);
     assert_int_equal(hello(NULL), WEFT_STATUS_OK);
     assert_int_equal(ask(WEFT_CMD_LEASE, "\xe8\x03 more from a newer minor", 25, NULL), WEFT_STATUS_OK);
@@ -548,6 +404,48 @@ static void test_reset_button(void **state)
     assert_int_equal(status().resets, 1);
 }
 
+static int set_setting(uint8_t key, uint8_t index, const char *value, size_t n)
+{
+    weft_cfg_set_request r = {.key = key, .index = index};
+    uint8_t bytes[WEFT_CFG_SET_REQUEST_BYTES];
+    memcpy(r.value, value, n);
+    weft_cfg_set_request_encode(&r, bytes);
+    return ask(WEFT_CMD_CFG_SET, bytes, sizeof bytes, NULL);
+}
+
+static void test_settings_survive_power_off_and_count(void **state)
+{
+    (void)state;
+    weft_hello_reply h;
+    double fraction[WEFT_SIM_N_LIGHTS];
+    assert_int_equal(hello(&h), WEFT_STATUS_OK);
+    assert_int_equal(h.settings_state, WEFT_SETTINGS_DEFAULTS);
+    assert_int_equal(h.serial_number[0], 0);
+    assert_int_equal(set_setting(WEFT_KEY_SERIAL_NUMBER, 0, "WL-7", 4), WEFT_STATUS_OK);
+    assert_int_equal(set_setting(WEFT_KEY_N_LIGHTS, 0, "\6", 1), WEFT_STATUS_OK);
+    assert_int_equal(set_setting(WEFT_KEY_MAX_ON, 0, "\x64", 1), WEFT_STATUS_OK);
+    assert_int_equal(set_setting(WEFT_KEY_TRIM, 2, "\x40", 1), WEFT_STATUS_OK);
+    weft_controller_sim_power_cycle(sim);
+    weft_controller_sim_run(sim, 3000);
+    assert_int_equal(hello(&h), WEFT_STATUS_OK);
+    assert_int_equal(h.reset_cause, WEFT_RESET_POWER_ON);
+    assert_int_equal(h.settings_state, WEFT_SETTINGS_LOADED);
+    assert_memory_equal(h.serial_number, "WL-7\0\0\0", 8);
+    assert_int_equal(h.n_lights, 6);
+    assert_int_equal(h.max_on_ms, 100);
+    take_lease(5000);
+    assert_int_equal(light(1 << 6, 256, 50), WEFT_STATUS_BAD_ARG);
+    assert_int_equal(light(1, 256, 101), WEFT_STATUS_LIMIT);
+    assert_int_equal(light(1 << 2, 256, 100), WEFT_STATUS_OK);
+    assert_int_equal(set_setting(WEFT_KEY_N_LIGHTS, 0, "\5", 1), WEFT_STATUS_BUSY); /* a light is on */
+    assert_true(weft_controller_sim_expose(sim, 1600, fraction));
+    assert_near(fraction[2], 0.25, 1e-12);
+    assert_int_equal(ask(WEFT_CMD_OFF, "", 0, NULL), WEFT_STATUS_OK);
+    assert_int_equal(set_setting(WEFT_KEY_DEFAULTS, 0, "", 0), WEFT_STATUS_OK);
+    assert_int_equal(hello(&h), WEFT_STATUS_OK);
+    assert_int_equal(h.n_lights, 10);
+}
+
 static void on_pulse(void *context)
 {
     ++*(int *)context;
@@ -603,6 +501,7 @@ int main(void)
         TEST(test_watchdog_ends_a_hang_in_darkness),
         TEST(test_panic_works_while_the_program_hangs),
         TEST(test_reset_button),
+        TEST(test_settings_survive_power_off_and_count),
         cmocka_unit_test(test_trigger_pulses_are_seen),
         cmocka_unit_test(test_bad_files),
     };

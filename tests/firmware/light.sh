@@ -11,7 +11,7 @@ coproc board { "$WEFT_TEST_BUILD/tests/virtual_controller" "$WEFT_TEST_BUILD/fir
 read -r pty <&"${board[0]}" || exit 1
 
 fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
-lights() { echo lights >&"${board[1]}"; read -r mask dark <&"${board[0]}"; }
+lights() { echo lights >&"${board[1]}"; read -r mask _ <&"${board[0]}"; }
 # expect STATUS WORDS COMMAND...: exit status, and words in what it says on either stream
 expect() {
     local wanted=$1 words=$2 got
@@ -89,7 +89,7 @@ ended 130
 # a board that resets under it
 hold on 1
 echo reset >&"${board[1]}"
-read -r mask dark <&"${board[0]}"
+read -r mask _ <&"${board[0]}"
 ended 1
 grep -q 'has reset meanwhile' "$dir/note" || fail "a reset says $(cat "$dir/note")"
 
@@ -106,5 +106,6 @@ expect 1 'there is no such port' "$weft" light status --port /dev/ttyNOT
 expect 1 'no virtual scanner' "$weft" light status --rig "$dir"
 expect 2 'light on' "$weft" light
 
-exec {board[1]}>&-
+board_in=${board[1]}
+exec {board_in}>&-
 exit $((failures > 0))
