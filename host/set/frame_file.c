@@ -17,6 +17,11 @@
 static weft_err check_hash(const char *path, const char *wanted, weft_error *err)
 {
     char found[65];
+    if (!weft_file_exists(path))
+        return weft_fail(err, WEFT_ERR_MISSING,
+                         "%s: set.json names it but it is not there; copy it back, or take it again with "
+                         "weft capture --resume",
+                         path);
     if (!*wanted)
         return WEFT_OK;
     WEFT_TRY(weft_sha256_file(path, found, err));

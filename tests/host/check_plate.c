@@ -441,11 +441,13 @@ static void test_what_does_not_agree_is_named(void **state)
     weft_raster_fini(&raster);
     add(&set, "rgb.png", WEFT_ROLE_LIGHT, 1, 1, 1);
     add(&set, "a.jpg", WEFT_ROLE_LIGHT, 2, 1, 1);
+    assert_ok(weft_file_write(weft_test_path("bad.set/a.jpg"), "JPEG", 4, err));
     add(&set, "absent.dng", WEFT_ROLE_LIGHT, 3, 1, 1);
     assert_fails(weft_plate_load_frame(&set, 1, &plate, err), WEFT_ERR_MISMATCH,
                  "rgb.png: has 3 channels of 16 bits");
     assert_fails(weft_plate_load_frame(&set, 2, &plate, err), WEFT_ERR_FORMAT, "a.jpg: a mosaic must be");
-    assert_fails(weft_plate_load_frame(&set, 3, &plate, err), WEFT_ERR_IO, "absent.dng: cannot be opened");
+    assert_fails(weft_plate_load_frame(&set, 3, &plate, err), WEFT_ERR_MISSING,
+                 "absent.dng: set.json names it");
     weft_set_fini(&set);
 }
 
