@@ -56,6 +56,14 @@ void weft_srgb_to_xyz(const double rgb[3], double xyz[3])
     apply(&srgb_to_xyz, rgb, xyz);
 }
 
+void weft_xyz_to_xyy(const double xyz[3], double xyy[3])
+{
+    const double sum = xyz[0] + xyz[1] + xyz[2];
+    xyy[0] = sum > 0 ? xyz[0] / sum : 0.3127;
+    xyy[1] = sum > 0 ? xyz[1] / sum : 0.3290;
+    xyy[2] = sum > 0 ? xyz[1] : 0;
+}
+
 void weft_xyz_to_srgb(const double xyz[3], double rgb[3])
 {
     apply_inverse(&srgb_to_xyz, xyz, rgb);

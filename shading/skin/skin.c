@@ -36,94 +36,126 @@ void weft_skin_reflectance(weft_skin_profile profile, double distance_mm, double
     }
 }
 
-/* Of the chord 2 r sin(x/2) a Gaussian is exp(-k (1 - cos x)), k = r^2/v: its integral and that times the
- * clamped cosine, over begin..end, which do not cross 0 or where the cosine turns negative. */
+/* What light does at an offset x around the ring, in up to MOMENTS numbers, and where that has kinks. */
+enum { MOMENTS = 3, MAX_CUTS = 3 };
+typedef struct receiver {
+    void (*fn)(double x_rad, double angle_rad, double value[MOMENTS]);
+    double angle_rad; /* theta of the transfer; end of the zonal integral */
+    int n_cuts;
+    double cuts_rad[MAX_CUTS]; /* rising */
+} receiver;
+
+/* Mean of the receiver's numbers over a Gaussian of the chord 2 r sin(x/2), which is exp(-k (1 - cos x)) with
+ * k = r^2/v, and the Gaussian's integral. */
 typedef struct ring_integral {
-    double light, total;
+    double value[MOMENTS], total;
 } ring_integral;
 
-static void add_piece(const weft_quadrature *q, double theta_rad, double k, double begin, double end,
+static void add_piece(const weft_quadrature *q, const receiver *to, double k, double begin, double end,
                       ring_integral *sum)
 {
     for (int i = 0; i < q->n; i++) {
         const double x =
             q->at[i] < 0.5 ? begin + (end - begin) * q->at[i] : end - (end - begin) * q->to_end[i];
         const double s = sin(x / 2), w = q->weight[i] * (end - begin) * exp(-2 * k * s * s);
-        const double cosine = cos(theta_rad + x);
+        double value[MOMENTS] = {0};
+        to->fn(x, to->angle_rad, value);
         sum->total += w;
-        sum->light += cosine > 0 ? w * cosine : 0;
+        for (int m = 0; m < MOMENTS; m++)
+            sum->value[m] += w * value[m];
     }
 }
 
-static ring_integral ring(const weft_quadrature *q, double theta_rad, double k)
+static ring_integral ring(const weft_quadrature *q, const receiver *to, double k)
 {
     const double reach = k > 20 ? 2 * asin(sqrt(20 / k)) : PI; /* behind it the exponential is below e^-40 */
-    /* in order: the cosine is positive between -pi/2 - theta and pi/2 - theta, and again from 3/2 pi - theta
-     */
-    const double cuts[] = {-reach, -PI / 2 - theta_rad, PI / 2 - theta_rad, 3 * PI / 2 - theta_rad, reach};
-    ring_integral sum = {0, 0};
+    ring_integral sum = {{0}, 0};
     double from = -reach;
-    for (int i = 1; i < 5; i++) {
-        const double to = fmin(fmax(cuts[i], from), reach);
-        if (from < 0 && to > 0) {
-            add_piece(q, theta_rad, k, from, 0, &sum);
-            add_piece(q, theta_rad, k, 0, to, &sum);
-        } else if (to > from) {
-            add_piece(q, theta_rad, k, from, to, &sum);
+    for (int i = 0; i <= to->n_cuts; i++) {
+        const double until = i < to->n_cuts ? fmin(fmax(to->cuts_rad[i], from), reach) : reach;
+        if (from < 0 && until > 0) {
+            add_piece(q, to, k, from, 0, &sum);
+            add_piece(q, to, k, 0, until, &sum);
+        } else if (until > from) {
+            add_piece(q, to, k, from, until, &sum);
         }
-        from = to;
+        from = until;
     }
     return sum;
 }
 
-static void transfer(const weft_quadrature *q, weft_skin_profile profile, double theta_rad, double radius_mm,
-                     double rgb[3])
+/* The receiver under the whole profile, normalised: moments by channel. */
+static void under_profile(const receiver *to, weft_skin_profile profile, double radius_mm,
+                          double moments[MOMENTS][3])
 {
-    double light[3] = {0}, total[3] = {0};
+    weft_quadrature q;
+    double total[3] = {0};
+    weft_quadrature_init(&q, 16);
+    for (int m = 0; m < MOMENTS; m++)
+        moments[m][0] = moments[m][1] = moments[m][2] = 0;
     for (int i = 0; i < GAUSSIANS; i++) {
-        const ring_integral part = ring(q, theta_rad, radius_mm * radius_mm / variance(profile, i));
+        const ring_integral part = ring(&q, to, radius_mm * radius_mm / variance(profile, i));
         for (int c = 0; c < 3; c++) {
-            light[c] += weights[i][c] * height(profile, i) * part.light;
-            total[c] += weights[i][c] * height(profile, i) * part.total;
+            const double a = weights[i][c] * height(profile, i);
+            total[c] += a * part.total;
+            for (int m = 0; m < MOMENTS; m++)
+                moments[m][c] += a * part.value[m];
         }
     }
-    for (int c = 0; c < 3; c++)
-        rgb[c] = light[c] / total[c];
+    for (int m = 0; m < MOMENTS; m++)
+        for (int c = 0; c < 3; c++)
+            moments[m][c] /= total[c];
+}
+
+static void clamped_cosine(double x_rad, double theta_rad, double value[MOMENTS])
+{
+    value[0] = fmax(cos(theta_rad + x_rad), 0);
 }
 
 void weft_skin_transfer(weft_skin_profile profile, double theta_rad, double radius_mm, double rgb[3])
 {
-    weft_quadrature q;
-    weft_quadrature_init(&q, 16);
-    transfer(&q, profile, theta_rad, radius_mm, rgb);
+    double moments[MOMENTS][3];
+    const receiver to = {
+        clamped_cosine, theta_rad, 3, {-PI / 2 - theta_rad, PI / 2 - theta_rad, 3 * PI / 2 - theta_rad}};
+    under_profile(&to, profile, radius_mm, moments);
+    for (int c = 0; c < 3; c++)
+        rgb[c] = moments[0][c];
 }
 
-static void add_zonal(const weft_quadrature *q, weft_skin_profile profile, double radius_mm, double begin,
-                      double end, double zonal[3][3])
+/* Antiderivatives in theta of sin cos^l cos(theta + x), l = 0..2, by sums of angles. */
+static void antiderivatives(double theta, double x, double value[3])
 {
-    for (int i = 0; i < q->n; i++) {
-        const double theta =
-            q->at[i] < 0.5 ? begin + (end - begin) * q->at[i] : end - (end - begin) * q->to_end[i];
-        const double w = 2 * PI * q->weight[i] * (end - begin) * sin(theta);
-        double rgb[3];
-        if (w < 1e-25)
-            continue;
-        transfer(q, profile, theta, radius_mm, rgb);
-        for (int l = 0; l < WEFT_SH_BANDS; l++)
-            for (int c = 0; c < 3; c++)
-                zonal[l][c] += w * weft_sh_zonal(l, cos(theta)) * rgb[c];
-    }
+    const double twice = cos(2 * theta + x), flat = theta * sin(x);
+    value[0] = -(twice / 2 + flat) / 2;
+    value[1] = -(cos(3 * theta + x) / 3 + cos(theta - x)) / 4;
+    value[2] = -(twice / 2 + flat + cos(4 * theta + x) / 4 + cos(2 * theta - x) / 2) / 8;
 }
 
-/* In two pieces: at pi/2 the transfer of a large radius has the kink of the clamped cosine. */
+/* Zonal coefficients of max(cos(theta + x), 0) over theta 0..end: turn of theta and x in closed form. */
+static void zonal_cosine(double x_rad, double end_rad, double value[MOMENTS])
+{
+    double moment[3] = {0};
+    for (int turn = 0; turn < 2; turn++) {
+        double high[3], low[3];
+        const double from = fmax(2 * PI * turn - PI / 2 - x_rad, 0);
+        const double to = fmin(2 * PI * turn + PI / 2 - x_rad, end_rad);
+        if (to <= from)
+            continue;
+        antiderivatives(to, x_rad, high);
+        antiderivatives(from, x_rad, low);
+        for (int m = 0; m < 3; m++)
+            moment[m] += high[m] - low[m];
+    }
+    value[0] = 2 * PI * weft_sh_zonal(0, 0) * moment[0];
+    value[1] = 2 * PI * weft_sh_zonal(1, 1) * moment[1];
+    value[2] =
+        2 * PI * (weft_sh_zonal(2, 0) * moment[0] + (weft_sh_zonal(2, 1) - weft_sh_zonal(2, 0)) * moment[2]);
+}
+
 void weft_skin_zonal(weft_skin_profile profile, double radius_mm, double end_rad, double zonal[3][3])
 {
-    weft_quadrature q;
-    weft_quadrature_init(&q, 16);
-    for (int l = 0; l < WEFT_SH_BANDS; l++)
-        for (int c = 0; c < 3; c++)
-            zonal[l][c] = 0;
-    add_zonal(&q, profile, radius_mm, 0, fmin(end_rad, PI / 2), zonal);
-    if (end_rad > PI / 2)
-        add_zonal(&q, profile, radius_mm, PI / 2, end_rad, zonal);
+    /* the lit arc begins or ends at one end of 0..end_rad; that at pi/2 - end_rad is 0 or -pi/2 for the two
+     * ends in use, and costs a few digits for others */
+    const receiver to = {zonal_cosine, end_rad, 3, {-PI / 2, PI / 2 - end_rad, PI / 2}};
+    under_profile(&to, profile, radius_mm, zonal);
 }

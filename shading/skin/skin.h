@@ -32,7 +32,7 @@ void weft_skin_reflectance(weft_skin_profile profile, double distance_mm, double
  *
  * @param theta_rad  angle between normal and light, 0..pi
  * @param radius_mm  above 0; the lookup of a table uses curvature 1/r
- * All digits, about 50 us.  Source: The Order eqs. 16, 17 after Penner and Borshukov; S-ORD-11.
+ * All digits, some 50 us.  Source: The Order eqs. 16, 17 after Penner and Borshukov; S-ORD-11.
  */
 void weft_skin_transfer(weft_skin_profile profile, double theta_rad, double radius_mm, double rgb[3]);
 

@@ -50,7 +50,7 @@ static void mip(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         weft_gloss_texel texels[4] = {0};
-        for (int k = 0; k < 4; k++) {
+        for (size_t k = 0; k < 4; k++) {
             const double x = in[3 * k][i], y = in[3 * k + 1][i];
             texels[k] = (weft_gloss_texel){{x, y, sqrt(1 - x * x - y * y)}, in[3 * k + 2][i], 0};
         }

@@ -1,4 +1,5 @@
-/* Tables of lights, sky, environment and occlusion. */
+/* Tables of lights, sky, environment, occlusion, and of colour. */
+#include "core/colour.h"
 #include "shading/bake/gloss.h"
 #include "shading/brdf/ggx.h"
 #include "shading/brdf/sampling.h"
@@ -171,6 +172,19 @@ static void upsample(int n, const double *const *in, double *const *out)
     }
 }
 
+static void chromaticity(int n, const double *const *in, double *const *out)
+{
+    for (int i = 0; i < n; i++) {
+        double rgb[3], xyz[3], xyy[3];
+        for (int c = 0; c < 3; c++)
+            rgb[c] = weft_srgb_decode(in[c][i]);
+        weft_srgb_to_xyz(rgb, xyz);
+        weft_xyz_to_xyy(xyz, xyy);
+        for (int c = 0; c < 3; c++)
+            out[c][i] = xyy[c];
+    }
+}
+
 const weft_vectors_model weft_vectors_lighting[] = {
     {"blog_hg", "S-BLG-08", "g cosine", "p", 1e-12, phase},
     {"blog_upsample", "S-BLG-09", "z z0 z1 z2 z3 c0 c1 c2 c3", "c", 1e-12, upsample},
@@ -184,6 +198,7 @@ const weft_vectors_model weft_vectors_lighting[] = {
     {"cod_envbrdf", "S-COD-19", "gloss nv", "scale bias", 1e-10, environment},
     {"cod_envbrdf_cone", "S-COD-20", "gloss nv cos_theta", "scale bias", 1e-9, environment_cone},
     {"cod_lambert_ec", "S-COD-21", "gloss f0 nl", "factor", 1e-10, conserving_lambert},
+    {"colour_xyY", "S-FC3-02", "r g b", "x y Y", 1e-10, chromaticity},
     {"hammersley", "S-UE4-06", "i N", "x y", 1e-15, hammersley},
     {"ue4_envbrdf", "S-UE4-09", "roughness nv", "A B", 1e-10, environment_unreal},
     {"ue4_falloff", "S-UE4-14", "distance light_radius", "falloff", 1e-12, falloff},

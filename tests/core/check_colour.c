@@ -38,6 +38,15 @@ static void test_xyz_and_lab(void **state)
     assert_near(lab[0], 32.297, 0.01);
     assert_near(lab[1], 79.188, 0.02);
     assert_near(lab[2], -107.860, 0.02);
+    double xyy[3];
+    weft_srgb_to_xyz(blue, xyz); /* the primary's chromaticity in BT.709 */
+    weft_xyz_to_xyy(xyz, xyy);
+    assert_near(xyy[0], 0.150, 5e-5);
+    assert_near(xyy[1], 0.060, 5e-5);
+    assert_near(xyy[2], 0.0722, 1e-15);
+    weft_xyz_to_xyy((const double[]){0, 0, 0}, xyy);
+    assert_near(xyy[0], 0.3127, 0);
+    assert_near(xyy[2], 0, 0);
     uint64_t seed = 1;
     for (int k = 0; k < 1000; k++) {
         double rgb[3];

@@ -38,8 +38,8 @@ static bool print_columns(const weft_vectors_column *columns, int n, double rtol
     for (int k = 0; k < n; k++) {
         const weft_vectors_column *const c = &columns[k];
         const bool within = c->worst_share <= 1;
-        printf("  %-20s rel %.2e  abs %.2e  (rtol %.0e)%s\n", c->name, c->max_rel, c->max_abs, rtol,
-               within ? "" : "  FAILED");
+        printf("  %-20s rel %.2e  abs %.2e  (rtol %.0e, %.1e of what is allowed)%s\n", c->name, c->max_rel,
+               c->max_abs, rtol, c->worst_share, within ? "" : "  FAILED");
         if (!within)
             printf("    row %d: got %.17g, wanted %.17g\n", c->worst_row, c->worst_got, c->worst_want);
         good &= within;

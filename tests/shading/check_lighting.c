@@ -1,0 +1,289 @@
+/* Lights, sky, environment and occlusion against figures and integrals from elsewhere. */
+#include "tests/support/support.h"
+
+#include "shading/brdf/albedo.h"
+#include "shading/brdf/half_vector.h"
+#include "shading/brdf/sampling.h"
+#include "shading/lighting/ambient_occlusion.h"
+#include "shading/lighting/area_light.h"
+#include "shading/lighting/environment.h"
+#include "shading/lighting/sky.h"
+#include "shading/lighting/volume_light.h"
+
+#include <math.h>
+
+#define SEED 20261124u
+
+static double between(uint64_t *random, double min, double max)
+{
+    return min + (max - min) * weft_test_random(random);
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void test_sky_has_its_published_values(void **state)
+{
+    (void)state;
+    const double degree = WEFT_PI / 180;
+    const weft_sky *const skies[] = {&weft_sky_cie_clear, &weft_sky_far_cry_3};
+    /* CIE S 011 type 12: element at zenith angle 45, opposite of a sun at zenith angle 30 */
+    assert_near(weft_sky_relative_to_zenith(&weft_sky_cie_clear, 45 * degree, 180 * degree, 30 * degree),
+                0.4544524, 5e-8);
+    for (int i = 0; i < 2; i++) {
+        assert_near(weft_sky_relative_to_zenith(skies[i], 0, 1, 0.7), 1, 1e-14);
+        assert_near(weft_sky_relative_to_sun(skies[i], 0.7, 0, 0.7), 1, 1e-14);
+        const double horizon = weft_sky_relative_to_zenith(skies[i], WEFT_PI / 2, 1, 0.7);
+        assert_near(weft_sky_relative_to_zenith(skies[i], WEFT_PI / 2 - 1e-6, 1, 0.7), horizon, 1e-5);
+        for (double zenith = 0; zenith <= WEFT_PI; zenith += 0.01)
+            assert_true(weft_sky_relative_to_sun(skies[i], zenith, 2, 1.5) > 0);
+    }
+}
+
+/* The projection against a plain sum over the hemisphere, with the sun at any azimuth. */
+static void test_sky_projection(void **state)
+{
+    (void)state;
+    enum { RINGS = 400, SECTORS = 400 };
+    const double sun_zenith = 0.9, sun_azimuth = 2.3;
+    double light[WEFT_SH_COUNT], sum[WEFT_SH_COUNT] = {0};
+    weft_sky_project(&weft_sky_cie_clear, sun_zenith, sun_azimuth, light);
+    for (int ring = 0; ring < RINGS; ring++)
+        for (int sector = 0; sector < SECTORS; sector++) {
+            const double zenith = (ring + 0.5) / RINGS * WEFT_PI / 2;
+            const double azimuth = (sector + 0.5) / SECTORS * 2 * WEFT_PI;
+            const double area = sin(zenith) * WEFT_PI / 2 / RINGS * 2 * WEFT_PI / SECTORS;
+            const double value =
+                weft_sky_relative_to_sun(&weft_sky_cie_clear, zenith, azimuth - sun_azimuth, sun_zenith);
+            double basis[WEFT_SH_COUNT];
+            weft_sh_basis(sin(zenith) * cos(azimuth), sin(zenith) * sin(azimuth), cos(zenith), basis);
+            for (int k = 0; k < WEFT_SH_COUNT; k++)
+                sum[k] += value * area * basis[k];
+        }
+    for (int k = 0; k < WEFT_SH_COUNT; k++)
+        assert_near(light[k], sum[k], 2e-5);
+}
+
+/* Light of 1 from everywhere is irradiance pi whichever way one looks; from one direction, a blurred cosine
+ * of the right integral. */
+static void test_irradiance_by_spherical_harmonics(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    const double even[WEFT_SH_COUNT] = {2 * sqrt(WEFT_PI)};
+    for (int i = 0; i < 100; i++) {
+        double n[3], sun[3], beam[WEFT_SH_COUNT];
+        weft_brdf_direction(between(&random, -1, 1), between(&random, 0, 7), n);
+        weft_brdf_direction(between(&random, -1, 1), between(&random, 0, 7), sun);
+        assert_near(weft_sh_convolve(n, weft_sh_cosine, even), WEFT_PI, 1e-13);
+        weft_sh_basis(sun[0], sun[1], sun[2], beam);
+        const double c = dot(n, sun); /* 1/4 + c/2 + 5/32 (3 c^2 - 1): three bands of the clamped cosine */
+        assert_near(weft_sh_convolve(n, weft_sh_cosine, beam), 0.25 + c / 2 + 5.0 / 32 * (3 * c * c - 1),
+                    1e-13);
+    }
+}
+
+static void test_falloff(void **state)
+{
+    (void)state;
+    assert_near(weft_light_falloff(0, 10), 1, 0);
+    assert_near(weft_light_falloff(10, 10), 0, 0);
+    assert_near(weft_light_falloff(1e9, 10), 0, 0);
+    assert_near(weft_light_falloff(1, 1e6), 0.5, 1e-12);
+    for (double d = 0; d < 10; d += 0.01)
+        assert_true(weft_light_falloff(d + 0.01, 10) <= weft_light_falloff(d, 10));
+}
+
+/* Distance of a point from the ray along r. */
+static double from_ray(const double p[3], const double r[3])
+{
+    const double along = dot(p, r);
+    return sqrt(fmax(dot(p, p) - along * along, 0));
+}
+
+static void test_sphere_takes_its_nearest_point(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    for (int i = 0; i < 200; i++) {
+        const double centre[3] = {between(&random, -2, 2), between(&random, -2, 2), between(&random, 3, 6)};
+        const double radius = between(&random, 0, 1.5);
+        double r[3];
+        weft_brdf_direction(between(&random, 0.85, 1), between(&random, 0, 7), r); /* not away from it */
+        const weft_light_point point = weft_light_sphere(centre, r, radius, 0.2);
+        assert_near(dot(point.l, point.l), 1, 1e-14);
+        assert_true(point.alpha >= 0.2 && point.norm <= 1);
+        /* a point of the sphere: the ray along l comes as near to the centre as the radius */
+        assert_true(from_ray(centre, point.l) <= radius + 1e-12);
+        const weft_light_point small = weft_light_sphere(centre, r, 0, 0.2);
+        assert_near(dot(small.l, centre), sqrt(dot(centre, centre)), 1e-12);
+        assert_near(small.norm, 1, 1e-15);
+        if (from_ray(centre, r) <= radius) /* the ray hits: it is the highlight itself */
+            assert_near(dot(point.l, r), 1, 1e-12);
+        else /* it misses: on the rim towards the ray */
+            assert_true(dot(point.l, r) > dot(small.l, r) - 1e-15);
+    }
+}
+
+static void test_tube_against_sums_along_it(void **state)
+{
+    (void)state;
+    enum { N = 20000 };
+    uint64_t random = SEED;
+    const double n[3] = {0, 0, 1};
+    for (int i = 0; i < 20; i++) {
+        double l0[3], l1[3], r[3], sum = 0, nearest = HUGE_VAL, best = 0, widest = -2, best_angle = 0;
+        for (int c = 0; c < 3; c++) {
+            l0[c] = between(&random, c == 2 ? 1 : -3, 3);
+            l1[c] = between(&random, c == 2 ? 1 : -3, 3);
+        }
+        weft_brdf_direction(between(&random, 0.3, 1), between(&random, 0, 7), r);
+        for (int k = 0; k < N; k++) {
+            const double t = (k + 0.5) / N;
+            const double p[3] = {l0[0] + t * (l1[0] - l0[0]), l0[1] + t * (l1[1] - l0[1]),
+                                 l0[2] + t * (l1[2] - l0[2])};
+            const double d2 = dot(p, p), off = from_ray(p, r), angle = dot(p, r) / sqrt(d2);
+            sum += dot(p, n) / (d2 * sqrt(d2)) / N;
+            best = off < nearest ? t : best;
+            nearest = fmin(off, nearest);
+            best_angle = angle > widest ? t : best_angle;
+            widest = fmax(angle, widest);
+        }
+        const weft_light_tube tube = weft_light_tube_of(l0, l1, r, 0.3);
+        assert_near(weft_light_tube_irradiance(l0, l1, n), sum, 1e-8);
+        assert_near(tube.t, best, 1e-3);
+        if (tube.smallest_angle > 0 && tube.smallest_angle < 1 && best_angle > 0.001 && best_angle < 0.999)
+            assert_near(tube.smallest_angle, best_angle, 1e-3);
+    }
+    const double along[3] = {0, 0, 2}, further[3] = {0, 0, 5};
+    assert_near(weft_light_tube_of(along, further, n, 0.3).t, 0, 0); /* parallel to the ray: the nearer end */
+    assert_near(weft_light_tube_of(further, along, n, 0.3).t, 1, 0);
+    assert_near(weft_light_tube_irradiance_soft(along, along, n), 1.0 / 5, 1e-15);
+}
+
+/* Reflectance of everything above the cone by a plain sum over light directions. */
+static double cone_sum(double alpha, double nv, double cone)
+{
+    enum { RINGS = 600, SECTORS = 600 };
+    double v[3], sum = 0;
+    weft_brdf_direction(nv, 0, v);
+    for (int ring = 0; ring < RINGS; ring++)
+        for (int sector = 0; sector < SECTORS; sector++) {
+            double l[3];
+            weft_brdf_direction(cone + (1 - cone) * (ring + 0.5) / RINGS, (sector + 0.5) / SECTORS * WEFT_PI,
+                                l);
+            const weft_half h = weft_half_of(l[0], l[1], l[2], v[0], v[1], v[2]);
+            sum += weft_ggx_d(h.nh, h.s2, alpha) * weft_ggx_v1(l[2], alpha) * weft_ggx_v1(nv, alpha) * l[2];
+        }
+    return sum * (1 - cone) * 2 * WEFT_PI / ((double)RINGS * SECTORS);
+}
+
+static void test_environment(void **state)
+{
+    (void)state;
+    const weft_brdf *ggx = NULL;
+    assert_ok(weft_brdf_find("ggx-specular", &ggx, err));
+    for (int i = 0; i < 6; i++) {
+        const double alpha = (double[]){0.01, 0.1, 0.5}[i % 3], nv = i < 3 ? 0.3 : 0.9;
+        const double white[WEFT_BRDF_MAX_PLANES] = {1, 1, 1, alpha};
+        double albedo[3], last = 2;
+        weft_brdf_albedo(ggx, white, nv, 0, WEFT_ALBEDO_EXACT, albedo);
+        const weft_environment_share all = weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, alpha, nv, 0);
+        assert_near(all.scale + all.bias, albedo[0], 1e-12);
+        assert_near(weft_environment_diffuse(all, 1), 1 - albedo[0], 1e-12);
+        for (int k = 0; k <= 7; k++) { /* the slices of Call of Duty's table */
+            const weft_environment_share cut =
+                weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, alpha, nv, k / 7.0);
+            assert_true(cut.scale + cut.bias < last && cut.scale >= 0 && cut.bias >= 0);
+            last = cut.scale + cut.bias;
+            if (alpha > 0.2 && k % 3 == 1)
+                assert_near(last, cone_sum(alpha, nv, k / 7.0), 1e-5);
+        }
+        assert_near(last, 0, 0);
+    }
+    /* Unreal's: k = alpha/2 is Smith itself at alpha 1 (S-UE4-04) */
+    const weft_environment_share smith = weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, 1, 0.4, 0);
+    const weft_environment_share schlick = weft_environment_brdf(WEFT_ENVIRONMENT_SCHLICK, 1, 0.4, 0);
+    assert_near(smith.scale, schlick.scale, 1e-12);
+    assert_true(isfinite(weft_environment_brdf(WEFT_ENVIRONMENT_SCHLICK, 0.3, 0, 0).scale));
+}
+
+static void test_prefilter(void **state)
+{
+    (void)state;
+    /* S-UE4-08, by other means */
+    const double roughness[] = {0.25, 0.5, 0.75, 1}, published[] = {0.97609, 0.86740, 0.74513, 2.0 / 3};
+    for (int i = 0; i < 4; i++) {
+        enum { N = 1 << 16 };
+        double moments[2], first = 0, second = 0, total = 0;
+        weft_environment_prefilter(roughness[i], 2, moments);
+        assert_near(moments[0], published[i], 6e-6);
+        for (uint32_t k = 0; k < N; k++) { /* the listing, N = V = R */
+            double u[2], h[3];
+            const double up[3] = {0, 0, 1};
+            weft_hammersley(k, N, u);
+            weft_sample_ggx_normal(up, roughness[i] * roughness[i], u[0], u[1], h);
+            const double nl = 2 * h[2] * h[2] - 1;
+            if (nl > 0) {
+                total += nl;
+                first += nl * nl;
+                second += nl * (3 * nl * nl - 1) / 2;
+            }
+        }
+        assert_near(moments[0], first / total, 2e-4);
+        assert_near(moments[1], second / total, 4e-4);
+    }
+}
+
+static void test_occlusion(void **state)
+{
+    (void)state;
+    enum { N = 100000 };
+    double threshold = 0, smooth = 0, sharp = 0, series = 0;
+    const double cone = weft_ao_cone_cosine(0.5);
+    for (int i = 0; i < N; i++) { /* cosine-weighted over the hemisphere: nl^2 is even (S-COD-17) */
+        const double nl = sqrt((i + 0.5) / N);
+        threshold += weft_ao_shadow_threshold(nl, cone) / N;
+        smooth += weft_ao_shadow_smooth(nl, cone) / N;
+        sharp += weft_ao_shadow_sharp(nl, cone) / N;
+    }
+    assert_near(threshold, 0.5, 1e-4);
+    assert_near(smooth, 5.0 / 6, 1e-4);
+    assert_near(sharp, 0.75, 1e-4);
+    for (int k = 0; k < 200; k++) /* one bounce after the other (S-COD-15) */
+        series += 0.4 * pow(0.8 * (1 - 0.4), k);
+    assert_near(weft_ao_interreflect(0.4, 0.8), series, 1e-12);
+    assert_near(weft_ao_interreflect(0, 1), 1, 0);
+    assert_near(weft_ao_shadow_smooth(0.5, 0), 1, 0); /* open */
+    assert_near(weft_ao_shadow_smooth(-0.5, 0), 0, 0);
+    assert_near(weft_ao_cone_cosine(1 + 1e-15), 0, 0);
+}
+
+static void test_phase_function_integrates_to_one(void **state)
+{
+    (void)state;
+    enum { N = 200000 };
+    double sum = 0;
+    for (int i = 0; i < N; i++)
+        sum += weft_phase_henyey_greenstein(0.8, -1 + 2 * (i + 0.5) / N) * 4 * WEFT_PI / N;
+    assert_near(sum, 1, 1e-8);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_sky_has_its_published_values),
+        cmocka_unit_test(test_sky_projection),
+        cmocka_unit_test(test_irradiance_by_spherical_harmonics),
+        cmocka_unit_test(test_falloff),
+        cmocka_unit_test(test_sphere_takes_its_nearest_point),
+        cmocka_unit_test(test_tube_against_sums_along_it),
+        cmocka_unit_test(test_environment),
+        cmocka_unit_test(test_prefilter),
+        cmocka_unit_test(test_occlusion),
+        cmocka_unit_test(test_phase_function_integrates_to_one),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
