@@ -1,20 +1,7 @@
 #!/usr/bin/env bash
 # weft brdf: the list, and values at the rows of a table.
 set -eu
-weft=$WEFT_TEST_BIN/weft
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-
-expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
-    local status=0 wanted=$1 words=$2
-    shift 2
-    "$@" >"$work/out" 2>&1 || status=$?
-    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" "$work/out"; then
-        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
-        cat "$work/out"
-        exit 1
-    fi
-}
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
 
 expect 0 'cloth: velvet' "$weft" brdf
 expect 0 'alpha        0.0001 to 1 (default 0.3)' "$weft" brdf ggx

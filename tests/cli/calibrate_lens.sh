@@ -1,26 +1,12 @@
 #!/usr/bin/env bash
 # weft calibrate lens on OpenCV's own photographs: the published figures, and what is refused.
 set -eu
-weft=$WEFT_TEST_BIN/weft
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
 photographs=${WEFT_SHARED:-$WEFT_TEST_SOURCE/../shared}/data/images/opencv_left
 if [ ! -d "$photographs" ]; then
     echo "skipped: the staged photographs $photographs are not here (set WEFT_SHARED to their folder)"
     exit 77
 fi
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-
-expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
-    local status=0 wanted=$1 words=$2
-    shift 2
-    "$@" >out 2>&1 || status=$?
-    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" out; then
-        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
-        cat out
-        exit 1
-    fi
-}
 
 if ldd "$weft" | grep -qi opencv; then
     echo "FAILED: weft is linked with OpenCV"

@@ -1,20 +1,8 @@
 #!/usr/bin/env bash
 # The frame of the command line: help, exit status, nearest word, completion.
 set -u
-weft=$WEFT_TEST_BIN/weft
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
 failures=0
-
-expect() { # expect STATUS WORDS COMMAND...: exit status, and WORDS in what it printed
-    local want=$1 words=$2 output status
-    shift 2
-    output=$("$@" 2>&1)
-    status=$?
-    if [ $status -ne "$want" ] || [[ $output != *"$words"* ]]; then
-        echo "FAIL: $* gave $status, wanted $want with \"$words\":"
-        echo "$output"
-        failures=$((failures + 1))
-    fi
-}
 
 expect 0 "usage: weft COMMAND" "$weft" --help
 expect 0 "weft 0." "$weft" --version

@@ -1,23 +1,10 @@
 #!/usr/bin/env bash
 # weft preview and weft contact on maps made by formula.
 set -eu
-weft=$WEFT_TEST_BIN/weft
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
 "$WEFT_TEST_BUILD/tests/make-weave-maps" weave.maps
 "$WEFT_TEST_BUILD/tests/make-weave-maps" sensor.maps sensor
 
-expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
-    local status=0 wanted=$1 words=$2
-    shift 2
-    "$@" >out 2>&1 || status=$?
-    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" out; then
-        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
-        cat out
-        exit 1
-    fi
-}
 is_png() { # FILE WIDTH HEIGHT
     python3 - "$@" <<'EOF'
 import struct, sys

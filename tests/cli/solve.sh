@@ -1,21 +1,7 @@
 #!/usr/bin/env bash
 # weft import, solve and compare from the command line, on a set made here.
 set -eu
-weft=$WEFT_TEST_BIN/weft
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-
-expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what it printed
-    local status=0 wanted=$1 words=$2
-    shift 2
-    "$@" >out 2>&1 || status=$?
-    if [ "$status" != "$wanted" ] || ! grep -qF -- "$words" out; then
-        echo "FAILED: $* exited $status (wanted $wanted), wanted: $words"
-        cat out
-        exit 1
-    fi
-}
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
 
 # 16-bit grey PNGs of a flat matte plate (z up, albedo 0.5) under five lights, written by hand
 python3 - <<'PY'
