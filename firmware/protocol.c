@@ -247,3 +247,33 @@ const char *weft_protocol_reset_text(uint8_t cause)
         return "unknown";
     }
 }
+
+const char *weft_protocol_settings_name(uint8_t number)
+{
+    switch (number) {
+#define WEFT_SETTINGS NAME_CASE
+#include "firmware/protocol.def"
+    default:
+        return "unknown";
+    }
+}
+
+const char *weft_protocol_fault_name(uint8_t number)
+{
+    switch (number) {
+#define WEFT_FAULT NAME_CASE
+#include "firmware/protocol.def"
+    default:
+        return "unknown";
+    }
+}
+
+const char *weft_protocol_fault_text(uint8_t number)
+{
+    switch (number) {
+#define WEFT_FAULT TEXT_CASE
+#include "firmware/protocol.def"
+    default:
+        return "unknown";
+    }
+}

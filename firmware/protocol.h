@@ -127,6 +127,9 @@ const char *weft_protocol_status_text(uint8_t status);
 const char *weft_protocol_state_name(uint8_t state);
 const char *weft_protocol_cause_name(uint8_t cause);
 const char *weft_protocol_cause_text(uint8_t cause);
+const char *weft_protocol_settings_name(uint8_t number);
+const char *weft_protocol_fault_name(uint8_t number);
+const char *weft_protocol_fault_text(uint8_t number);
 const char *weft_protocol_reset_name(uint8_t cause);
 const char *weft_protocol_reset_text(uint8_t cause);
 

@@ -13,6 +13,7 @@
 typedef struct light_args {
     weft_device_options devices;
     double seconds; /* 0: until Ctrl-C */
+    bool watch;
 } light_args;
 
 static const weft_field hold_fields[] = {
@@ -31,6 +32,16 @@ static const weft_field hold_fields[] = {
 
 static const weft_field plain_fields[] = {
     WEFT_CONTROLLER_FIELDS(light_args, devices),
+    {0},
+};
+
+static const weft_field status_fields[] = {
+    WEFT_CONTROLLER_FIELDS(light_args, devices),
+    {.key = "watch",
+     .short_opt = 'w',
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(light_args, watch),
+     .help = "go on, a line every half a second, until Ctrl-C"},
     {0},
 };
 
@@ -225,28 +236,53 @@ static weft_err print_status(const weft_invocation *inv, const weft_controller_i
     if (inv->json)
         return weft_print_json(
             inv,
-            json_pack(
-                "{s:s, s:s, s:s, s:s, s:[ii], s:i, s:i, s:i, s:I, s:s, s:s, s:o, s:i, s:i, s:I, s:I, s:I, "
-                "s:I, s:I}",
-                "port", i->port, "firmware", i->firmware, "git", i->git_id, "serial", i->serial_number,
-                "protocol", i->protocol_major, i->protocol_minor, "n_lights", i->n_lights, "level_max",
-                i->level_max, "max_on_ms", i->max_on_ms, "tick_hz", (json_int_t)i->tick_hz, "reset_cause",
-                i->reset_cause, "state", s->state, "lights", mask_to_json(s->lights), "level", s->level,
-                "lease_left_ms", s->lease_left_ms, "frames", (json_int_t)s->frames, "crc_errors",
-                (json_int_t)s->crc_errors, "overruns", (json_int_t)s->overruns, "resets",
-                (json_int_t)s->resets, "retries", (json_int_t)s->retries),
+            json_pack("{s:s, s:s, s:s, s:s, s:s, s:[ii], s:i, s:i, s:i, s:I, s:s, s:s, s:o, s:i, s:i, s:I, "
+                      "s:I, s:I, "
+                      "s:I, s:I}",
+                      "port", i->port, "firmware", i->firmware, "git", i->git_id, "serial", i->serial_number,
+                      "settings", i->settings, "protocol", i->protocol_major, i->protocol_minor, "n_lights",
+                      i->n_lights, "level_max", i->level_max, "max_on_ms", i->max_on_ms, "tick_hz",
+                      (json_int_t)i->tick_hz, "reset_cause", i->reset_cause, "state", s->state, "lights",
+                      mask_to_json(s->lights), "level", s->level, "lease_left_ms", s->lease_left_ms, "frames",
+                      (json_int_t)s->frames, "crc_errors", (json_int_t)s->crc_errors, "overruns",
+                      (json_int_t)s->overruns, "resets", (json_int_t)s->resets, "retries",
+                      (json_int_t)s->retries),
             err);
     fprintf(inv->out,
             "port        %s\n"
             "firmware    %s (%s), protocol %d.%d\n"
             "serial      %s\n"
+            "settings    %s\n"
             "lights      %d, levels 0 to %d, at most %d ms at a time\n"
             "state       %s\n"
             "last start  %s, %u resets since power on\n"
             "line        %u frames, %u damaged, %u bytes lost, %u retries\n",
             i->port, i->firmware, i->git_id, i->protocol_major, i->protocol_minor,
-            i->serial_number[0] ? i->serial_number : "none stored", i->n_lights, i->level_max, i->max_on_ms,
-            s->state, i->reset_cause, s->resets, s->frames, s->crc_errors, s->overruns, s->retries);
+            i->serial_number[0] ? i->serial_number : "none stored", i->settings, i->n_lights, i->level_max,
+            i->max_on_ms, s->state, i->reset_cause, s->resets, s->frames, s->crc_errors, s->overruns,
+            s->retries);
+    return WEFT_OK;
+}
+
+/* One line, or one JSON object, every half a second. */
+static weft_err watch(const weft_invocation *inv, weft_controller *c, weft_error *err)
+{
+    while (!weft_cancelled()) {
+        weft_controller_status s;
+        char lights[128];
+        WEFT_TRY(weft_controller_get_status(c, &s, err));
+        print_mask(s.lights, lights, sizeof lights);
+        if (inv->json)
+            WEFT_TRY(print_status(inv, weft_controller_get_info(c), &s, err));
+        else
+            fprintf(inv->out, "%10.3f s  %-7s  lights %s  %u frames, %u damaged, %u bytes lost, %u retries\n",
+                    (double)s.ticks / weft_controller_get_info(c)->tick_hz, s.state,
+                    lights[0] ? lights : "none", s.frames, s.crc_errors, s.overruns, s.retries);
+        if (fflush(inv->out) != 0)
+            return weft_fail_errno(err, WEFT_ERR_IO, "the result cannot be written");
+        for (int i = 0; i < 25 && !weft_cancelled(); i++)
+            nanosleep(&(struct timespec){.tv_nsec = 20000000}, NULL);
+    }
     return WEFT_OK;
 }
 
@@ -258,6 +294,8 @@ static weft_err run_status(const weft_invocation *inv, const void *args, weft_er
     weft_err status = weft_controller_get_status(c, &s, err);
     if (status == WEFT_OK)
         status = print_status(inv, weft_controller_get_info(c), &s, err);
+    if (status == WEFT_OK && ((const light_args *)args)->watch)
+        status = watch(inv, c, err);
     weft_controller_close(c);
     return status;
 }
@@ -311,7 +349,7 @@ const weft_command weft_cmd_light_status = {
     .summary = "say what the light controller is and how it does",
     .operands = "",
     .args_size = sizeof(light_args),
-    .fields = plain_fields,
+    .fields = status_fields,
     .details = "Opening the port resets an Arduino, so its counters begin at that.",
     .example = "weft light status --json",
     .run = run_status,

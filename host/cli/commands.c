@@ -15,6 +15,8 @@ extern const weft_command weft_cmd_rig;
 extern const weft_command weft_cmd_light_level;
 extern const weft_command weft_cmd_light_off;
 extern const weft_command weft_cmd_light_on;
+extern const weft_command weft_cmd_light_run;
+extern const weft_command weft_cmd_light_set;
 extern const weft_command weft_cmd_light_status;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
@@ -28,6 +30,8 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_light_on,
     &weft_cmd_light_level,
     &weft_cmd_light_off,
+    &weft_cmd_light_run,
+    &weft_cmd_light_set,
     &weft_cmd_light_status,
     &weft_cmd_capture,
     &weft_cmd_calibrate_lens,

@@ -4,7 +4,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/light/controller_crash.h"
-#include "host/light/serial_port.h"
+#include "host/light/controller_private.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -16,19 +16,6 @@ static const int try_ms[] = {50, 100, 200, 400};
 enum { N_TRIES = sizeof try_ms / sizeof try_ms[0] };
 
 static const double hello_every_s = 0.2, hello_within_s = 3; /* an Uno's bootloader takes up to 1.5 s */
-
-struct weft_controller {
-    weft_serial serial;
-    uint8_t seq;
-    uint8_t wire[WEFT_FRAME_WIRE_MAX]; /* the frame that is coming in */
-    size_t n;
-    bool too_long;
-    uint8_t unread[256]; /* bytes behind it */
-    size_t unread_at, unread_n;
-    size_t n_bytes; /* that ever came */
-    uint32_t retries, bad_replies;
-    weft_controller_info info;
-};
 
 /* -- frames --------------------------------------------------------------------------------------------- */
 
@@ -70,11 +57,30 @@ static weft_err next_frame(weft_controller *c, double deadline_s, weft_frame *fr
     }
 }
 
-static void note_event(const weft_controller *c, const weft_frame *frame)
+static void note_event(weft_controller *c, const weft_frame *frame)
 {
     if (frame->command == WEFT_EVENT_SAFE && frame->n >= WEFT_SAFE_EVENT_BYTES)
         weft_explain("%s: the controller went dark: %s", c->serial.name,
                      weft_protocol_cause_text(frame->payload[0]));
+    else if (c->n_events < MAX_EVENTS) /* when full, the new one is lost, and a run misses it */
+        c->events[c->n_events++] = *frame;
+}
+
+weft_err weft_controller_next_event(weft_controller *c, double deadline_s, weft_frame *event, bool *got,
+                                    weft_error *err)
+{
+    weft_frame frame;
+    *got = true;
+    while (c->n_events == 0 && *got) {
+        WEFT_TRY(next_frame(c, deadline_s, &frame, got, err));
+        if (*got && frame.type == WEFT_FRAME_EVENT)
+            note_event(c, &frame);
+    }
+    if (c->n_events > 0) {
+        *event = c->events[0];
+        memmove(c->events, c->events + 1, (size_t)--c->n_events * sizeof c->events[0]);
+    }
+    return WEFT_OK;
 }
 
 /* The reply to `seq`, or any complaint of a damaged frame: only one command is ever under way. */
@@ -170,13 +176,20 @@ static weft_err refused(weft_controller *c, uint8_t command, uint8_t code, weft_
         WEFT_TRY(check_same_boot(c, &status, err));
         WEFT_TRY(check_not_safe(c, &status, err));
     }
-    return weft_fail(err, WEFT_ERR_PROTOCOL, "%s: the light controller refuses %s: %s", c->serial.name,
-                     weft_protocol_command_name(command), weft_protocol_status_text(code));
+    if (code == WEFT_STATUS_EEPROM)
+        return weft_fail(
+            err, WEFT_ERR_DEVICE,
+            "%s: the controller's settings cannot be stored, or those that it has cannot be read; "
+            "\"weft light set defaults\" begins anew",
+            c->serial.name);
+    return weft_fail(
+        err, code == WEFT_STATUS_BAD_ARG || code == WEFT_STATUS_LIMIT ? WEFT_ERR_RANGE : WEFT_ERR_PROTOCOL,
+        "%s: the light controller refuses %s: %s", c->serial.name, weft_protocol_command_name(command),
+        weft_protocol_status_text(code));
 }
 
-/* A command whose reply must be OK; `reply` is then at least `bytes` long behind its status. */
-static weft_err command(weft_controller *c, uint8_t number, const uint8_t *payload, uint8_t n, uint8_t bytes,
-                        weft_frame *reply, weft_error *err)
+weft_err weft_controller_command(weft_controller *c, uint8_t number, const uint8_t *payload, uint8_t n,
+                                 uint8_t bytes, weft_frame *reply, weft_error *err)
 {
     WEFT_TRY(transact(c, number, payload, n, reply, err));
     if (reply->payload[0] != WEFT_STATUS_OK)
@@ -259,6 +272,8 @@ static void fill_info(weft_controller *c, const weft_hello_reply *hello)
         .tick_hz = hello->tick_hz,
         .boot_nonce = hello->boot_nonce,
         .capabilities = hello->capabilities,
+        .max_steps = hello->max_steps,
+        .settings = weft_protocol_settings_name(hello->settings_state),
     };
     snprintf(info->port, sizeof info->port, "%s", c->serial.name);
     snprintf(info->firmware, sizeof info->firmware, "%d.%d.%d", hello->fw_version[0], hello->fw_version[1],
@@ -276,7 +291,8 @@ static weft_err take_lease(weft_controller *c, int lease_ms, weft_error *err)
     uint8_t payload[WEFT_LEASE_REQUEST_BYTES];
     weft_frame reply;
     weft_lease_request_encode(&request, payload);
-    return command(c, WEFT_CMD_LEASE, payload, sizeof payload, WEFT_LEASE_REPLY_BYTES, &reply, err);
+    return weft_controller_command(c, WEFT_CMD_LEASE, payload, sizeof payload, WEFT_LEASE_REPLY_BYTES, &reply,
+                                   err);
 }
 
 weft_err weft_controller_open(const char *port, int lease_ms, weft_controller **controller, weft_error *err)
@@ -351,7 +367,8 @@ weft_err weft_controller_light(weft_controller *c, uint32_t mask, int level, int
     weft_frame frame;
     weft_light_reply reply;
     weft_light_request_encode(&request, payload);
-    WEFT_TRY(command(c, WEFT_CMD_LIGHT, payload, sizeof payload, WEFT_LIGHT_REPLY_BYTES, &frame, err));
+    WEFT_TRY(weft_controller_command(c, WEFT_CMD_LIGHT, payload, sizeof payload, WEFT_LIGHT_REPLY_BYTES,
+                                     &frame, err));
     weft_light_reply_decode(frame.payload + 1, (uint8_t)(frame.n - 1), &reply);
     if (on_tick)
         *on_tick = reply.on_tick;
@@ -362,7 +379,8 @@ weft_err weft_controller_off(weft_controller *c, uint32_t *off_tick, weft_error 
 {
     weft_frame frame;
     weft_off_reply reply;
-    WEFT_TRY(command(c, WEFT_CMD_OFF, (const uint8_t *)"", 0, WEFT_OFF_REPLY_BYTES, &frame, err));
+    WEFT_TRY(
+        weft_controller_command(c, WEFT_CMD_OFF, (const uint8_t *)"", 0, WEFT_OFF_REPLY_BYTES, &frame, err));
     weft_off_reply_decode(frame.payload + 1, (uint8_t)(frame.n - 1), &reply);
     if (off_tick)
         *off_tick = reply.off_tick;

@@ -28,8 +28,10 @@ typedef struct weft_controller_info {
     int max_on_ms; /* the longest time that one weft_controller_light() may ask for */
     uint32_t tick_hz;
     uint32_t boot_nonce;
-    uint32_t capabilities;
-    char reset_cause[32]; /* "POWER_ON", "WATCHDOG", ... */
+    uint32_t capabilities; /* WEFT_CAPABILITY_* */
+    int max_steps;         /* longest sequence; 0: none */
+    const char *settings;  /* "DEFAULTS", "LOADED", "UNREADABLE" */
+    char reset_cause[32];  /* "POWER_ON", "WATCHDOG", ... */
 } weft_controller_info;
 
 typedef struct weft_controller_status {
@@ -76,6 +78,54 @@ weft_err weft_controller_get_status(weft_controller *controller, weft_controller
 /** Renews the lease: call at least every lease_ms / 3 while waiting for something else.
  *  @return WEFT_ERR_DEVICE when the board has reset or went dark by itself meanwhile */
 weft_err weft_controller_keep_alive(weft_controller *controller, weft_error *err);
+
+/* -- sequences (controller_sequence.c) */
+
+/** A step, as docs/protocol.md draws it; all times are kept to 4 us. */
+typedef struct weft_controller_step {
+    uint32_t lights;     /* bit i: light i; 0 for a dark frame */
+    int level;           /* 0..info->level_max */
+    uint32_t settle_us;  /* lights on to trigger; 0..250 000 */
+    uint32_t trigger_us; /* pulse; 0 (none), 20..250 000 */
+    uint32_t hold_us;    /* trigger to lights off, or the longest wait; 100.. */
+    bool until_exposure; /* lights go off when the exposure line falls */
+    uint32_t gap_us;     /* dark behind it; 0..10 000 000 */
+} weft_controller_step;
+
+/** What a step has been; times in ticks of the board (info->tick_hz). */
+typedef struct weft_controller_step_result {
+    int index;
+    bool rose, fell; /* the exposure line, after the trigger and before lights off */
+    uint32_t on_tick, trigger_tick, rise_tick, fall_tick, off_tick; /* rise, fall: only if rose, fell */
+} weft_controller_step_result;
+
+/** Whether the exposure line proves that these lights covered the exposure, settled. */
+bool weft_controller_step_is_proved(const weft_controller_info *info, const weft_controller_step *step,
+                                    const weft_controller_step_result *result);
+
+/**
+ * Runs n steps in the board and waits for their end, keeping the lease.  When cancelled (core/progress.h) the
+ * sequence is aborted.
+ *
+ * @param n        1 .. info->max_steps
+ * @param results  n of them
+ * @return WEFT_ERR_RANGE; WEFT_ERR_UNSUPPORTED by firmware without sequences; WEFT_ERR_DEVICE when the camera
+ *         does not expose as it should, the board has reset or went dark; WEFT_ERR_PROTOCOL when what it
+ * tells is not complete; WEFT_ERR_CANCELLED; always dark then
+ */
+weft_err weft_controller_run_sequence(weft_controller *controller, const weft_controller_step *steps, int n,
+                                      weft_controller_step_result *results, weft_error *err);
+
+/* -- settings of the board (controller_settings.c) */
+
+/** Reads a setting: WEFT_KEY_*, `index` of the light for a trim.  @param value  8 bytes, see protocol.def */
+weft_err weft_controller_get_setting(weft_controller *controller, int key, int index, uint8_t value[8],
+                                     weft_error *err);
+/** Stores a setting in the EEPROM; no light may be on.  The sequence table is empty afterwards; info is
+ *  that of the next opening.
+ *  @return WEFT_ERR_RANGE when the board refuses the value, WEFT_ERR_DEVICE when it cannot be stored */
+weft_err weft_controller_set_setting(weft_controller *controller, int key, int index, const uint8_t value[8],
+                                     weft_error *err);
 
 /** File descriptor for the panic bytes: write(fd, "\0\0\0", 3) is async-signal-safe. */
 int weft_controller_panic_fd(const weft_controller *controller);

@@ -230,6 +230,84 @@ static void test_firmware_of_another_protocol(void **state)
                  "speaks protocol 2, this program 1; flash");
 }
 
+/* -- sequences and settings -------------------------------------------------------------------------------
+ */
+
+static void test_a_sequence_with_a_camera(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    const weft_controller_info *const info = weft_controller_get_info(c);
+    weft_controller_step steps[17] = {0};
+    weft_controller_step_result results[17];
+    for (int i = 0; i < 16; i++)
+        steps[i] = (weft_controller_step){.lights = i < 10 ? 1u << i : 0,
+                                          .level = 256,
+                                          .settle_us = 2000,
+                                          .trigger_us = 100,
+                                          .hold_us = 20000,
+                                          .until_exposure = i % 2 == 0,
+                                          .gap_us = 1000};
+    weft_controller_sim_set_camera(sim, 200, 10000);
+    for (int run = 0; run < 3; run++) {
+        assert_ok(weft_controller_run_sequence(c, steps, 16, results, err));
+        for (int i = 0; i < 16; i++) {
+            assert_int_equal(results[i].index, i);
+            assert_true(weft_controller_step_is_proved(info, &steps[i], &results[i]));
+            const double on_us = 4.0 * (results[i].off_tick - results[i].on_tick);
+            assert_near(on_us, i % 2 ? 22000 : 12200, 60);
+        }
+    }
+    weft_controller_step_result early = results[1];
+    early.rise_tick = early.on_tick + 400; /* 1.6 ms after lights on */
+    assert_false(weft_controller_step_is_proved(info, &steps[1], &early));
+    assert_fails(weft_controller_run_sequence(c, steps, 17, results, err), WEFT_ERR_RANGE, "takes 1 to 16");
+    steps[3].lights = 1 << 10;
+    assert_fails(weft_controller_run_sequence(c, steps, 16, results, err), WEFT_ERR_RANGE,
+                 "step 3: there is no light 10");
+    steps[3].lights = 1;
+    steps[4].hold_us = 1999999;
+    assert_fails(weft_controller_run_sequence(c, steps, 16, results, err), WEFT_ERR_RANGE, "at most 2000 ms");
+    weft_controller_sim_set_camera(sim, 0, 0);
+    assert_fails(weft_controller_run_sequence(c, steps, 2, results, err), WEFT_ERR_DEVICE,
+                 "stopped in step 0, dark: the exposure line did not rise and fall in time");
+    assert_int_equal(weft_controller_sim_lights(sim, NULL), 0);
+    weft_controller_close(c);
+}
+
+/* Longer than the lease: it is kept meanwhile. */
+static void test_a_sequence_longer_than_the_lease(void **state)
+{
+    (void)state;
+    weft_controller *const c = open_it(1000);
+    const weft_controller_step steps[] = {{.lights = 1, .level = 256, .hold_us = 1500000, .gap_us = 1000000}};
+    weft_controller_step_result results[1];
+    assert_ok(weft_controller_run_sequence(c, steps, 1, results, err));
+    assert_near(4.0 * (results[0].off_tick - results[0].on_tick), 1500000, 60);
+    weft_controller_close(c);
+}
+
+static void test_settings_stay_and_tell_who_it_is(void **state)
+{
+    (void)state;
+    weft_controller *c = open_it(1000);
+    uint8_t value[8] = "WL-00042", back[8];
+    assert_string_equal(weft_controller_get_info(c)->settings, "DEFAULTS");
+    assert_ok(weft_controller_set_setting(c, WEFT_KEY_SERIAL_NUMBER, 0, value, err));
+    assert_ok(weft_controller_set_setting(c, WEFT_KEY_N_LIGHTS, 0, (const uint8_t[8]){6}, err));
+    assert_ok(weft_controller_get_setting(c, WEFT_KEY_N_LIGHTS, 0, back, err));
+    assert_int_equal(back[0], 6);
+    assert_fails(weft_controller_set_setting(c, WEFT_KEY_N_LIGHTS, 0, (const uint8_t[8]){11}, err),
+                 WEFT_ERR_RANGE, "refuses CFG_SET");
+    weft_controller_close(c);
+    c = open_it(1000); /* which resets it */
+    assert_string_equal(weft_controller_get_info(c)->settings, "LOADED");
+    assert_string_equal(weft_controller_get_info(c)->serial_number, "WL-00042");
+    assert_int_equal(weft_controller_get_info(c)->n_lights, 6);
+    assert_fails(weft_controller_light(c, 1 << 6, 256, 100, NULL, err), WEFT_ERR_RANGE, "no light 6");
+    weft_controller_close(c);
+}
+
 /* -- a host that dies ----------------------------------------------------------------------------------- */
 
 /* This program again, as a host that lights two lamps, says so and then does as told. */
@@ -472,6 +550,9 @@ int main(int argc, char **argv)
         TEST(test_port_vanishes),
         cmocka_unit_test_teardown(test_nobody_answers, stop),
         cmocka_unit_test_teardown(test_firmware_of_another_protocol, stop),
+        TEST(test_a_sequence_with_a_camera),
+        TEST(test_a_sequence_longer_than_the_lease),
+        TEST(test_settings_stay_and_tell_who_it_is),
         TEST(test_killed_host_leaves_darkness_within_a_second),
         TEST(test_crashed_host_leaves_darkness_at_once),
         TEST(test_a_bad_cable_costs_retries_and_nothing_else),

@@ -1,6 +1,7 @@
 /*
  * virtual_controller ELF: the light controller alone, for tests of programs.  Prints the pty; then answers
- * lines on stdin until it ends: "lights" (mask, seconds of simulated time that they have been dark), "reset".
+ * lines on stdin until it ends: "lights" (mask, seconds of simulated time that they have been dark), "reset",
+ * "camera DELAY_US EXPOSURE_US" (one on trigger and exposure line; 0 0: none).
  */
 #include "host/rig/controller_sim.h"
 
@@ -20,6 +21,9 @@ int main(int argc, char **argv)
     fflush(stdout);
     while (fgets(line, sizeof line, stdin)) {
         double dark_s;
+        unsigned delay_us, exposure_us;
+        if (sscanf(line, "camera %u %u", &delay_us, &exposure_us) == 2)
+            weft_controller_sim_set_camera(sim, delay_us, exposure_us);
         if (strcmp(line, "reset\n") == 0)
             weft_controller_sim_reset(sim);
         const unsigned lights = weft_controller_sim_lights(sim, &dark_s);
