@@ -2,12 +2,13 @@
 #ifndef WEFT_SHADING_BRDF_BLINN_PHONG_H
 #define WEFT_SHADING_BRDF_BLINN_PHONG_H
 
+#include "shading/brdf/log_positive.h"
 #include "shading/brdf/schlick_smith.h"
 
 /** Power of a gloss 0..1: m = 2^(13 g), 1..8192.  Source: S-FC3-10. */
 static inline double weft_blinn_phong_power(double gloss)
 {
-    return exp2(13 * gloss);
+    return weft_exp_negative(13 * 0.69314718055994530942 * gloss);
 }
 
 /** Gloss of a power, cut to 0..1; a power of 0 or less gives 0.  Source: S-FC3-14. */
@@ -42,8 +43,8 @@ static inline double weft_blinn_phong_alpha_of_power(double power)
  */
 static inline double weft_blinn_phong_d(double s2, double power)
 {
-    const double log_nh = s2 < 1 ? 0.5 * log1p(-s2) : -1e4;
-    return (power + 2) / 6.28318530717958647692 * exp(power * log_nh);
+    const double log_nh = s2 < 1 ? 0.5 * weft_log_one_minus(s2) : -1e4;
+    return (power + 2) / 6.28318530717958647692 * weft_exp_negative(power * log_nh);
 }
 
 /**

@@ -2,6 +2,8 @@
 #include "shading/brdf/fresnel.h"
 #include "shading/brdf/sampling.h"
 
+#include "core/clones.h"
+
 enum { F0 = 0, GLOSS = 3 }; /* first planes */
 
 static const weft_brdf_param params[] = {
@@ -11,17 +13,25 @@ static const weft_brdf_param params[] = {
 };
 
 /* f = F D/4 V1(nl) V1(nv), S-FC3-09 to S-FC3-12. */
+WEFT_CLONES
 static void eval(const weft_brdf_batch *b, double *const value[3])
 {
+    const double *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
+    const double *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
+    const double *const fr = b->param[F0], *const fg = b->param[F0 + 1], *const fb = b->param[F0 + 2];
+    const double *const gloss = b->param[GLOSS];
+    double *const r = value[0], *restrict const g = value[1], *restrict const bl = value[2];
+    WEFT_INDEPENDENT
     for (int i = 0; i < b->n; i++) {
-        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
-                                         b->view[1][i], b->view[2][i]);
-        const double nl = h.valid > 0 ? h.nl : 1, power = weft_blinn_phong_power(b->param[GLOSS][i]);
+        const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
+        const double nl = h.valid > 0 ? h.nl : 1, power = weft_blinn_phong_power(gloss[i]);
         const double k = weft_schlick_k_power(power);
         const double dv =
             h.valid * weft_blinn_phong_d(h.s2, power) / 4 * weft_schlick_v1(nl, k) * weft_schlick_v1(h.nv, k);
-        for (int c = 0; c < 3; c++)
-            value[c][i] = dv * weft_fresnel_schlick(b->param[F0 + c][i], h.lh);
+        const double w = weft_schlick_weight(h.lh);
+        r[i] = dv * (fr[i] + (1 - fr[i]) * w);
+        g[i] = dv * (fg[i] + (1 - fg[i]) * w);
+        bl[i] = dv * (fb[i] + (1 - fb[i]) * w);
     }
 }
 

@@ -1,6 +1,8 @@
 #include "shading/brdf/charlie.h"
 #include "shading/brdf/sampling.h"
 
+#include "core/clones.h"
+
 static const weft_brdf_param params[] = {
     {"sheen", NULL, 3, 0, 1, 0.5, "", "colour of the sheen"},
     {"alpha", NULL, 1, 0.1, 1, 0.5, "", "width of the rim (the square of glTF's sheen roughness)"},
@@ -8,15 +10,22 @@ static const weft_brdf_param params[] = {
 };
 
 /* f = sheen D G/(4 nl nv). */
+WEFT_CLONES
 static void eval(const weft_brdf_batch *b, double *const value[3])
 {
+    const double *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
+    const double *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
+    const double *const cr = b->param[0], *const cg = b->param[1], *const cb = b->param[2];
+    const double *const alpha = b->param[3];
+    double *const r = value[0], *restrict const g = value[1], *restrict const bl = value[2];
+    WEFT_INDEPENDENT
     for (int i = 0; i < b->n; i++) {
-        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
-                                         b->view[1][i], b->view[2][i]);
-        const double alpha = b->param[3][i];
-        const double dv = h.valid > 0 ? weft_charlie_d(h.s2, alpha) * weft_charlie_v(h.nl, h.nv, alpha) : 0;
-        for (int c = 0; c < 3; c++)
-            value[c][i] = dv * b->param[c][i];
+        const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
+        const double nl = h.valid > 0 ? h.nl : 1;
+        const double dv = h.valid * weft_charlie_d(h.s2, alpha[i]) * weft_charlie_v(nl, h.nv, alpha[i]);
+        r[i] = dv * cr[i];
+        g[i] = dv * cg[i];
+        bl[i] = dv * cb[i];
     }
 }
 

@@ -2,7 +2,7 @@
 #include "shading/brdf/fresnel.h"
 #include "shading/brdf/sampling.h"
 
-#include <stdbool.h>
+#include "core/clones.h"
 
 /* first planes, in the order of params */
 enum {
@@ -34,7 +34,7 @@ static const weft_brdf_param params[] = {
     {0},
 };
 
-static double lerp(double a, double b, double t)
+WEFT_INLINE double lerp(double a, double b, double t)
 {
     return a + (b - a) * t;
 }
@@ -48,40 +48,44 @@ typedef struct terms {
     double weight;    /* Schlick's, of lh */
 } terms;
 
-static terms terms_of(const weft_brdf_batch *b, int i, const weft_half *h)
+/* Where it is not `lit` the terms are 0, and the cosines may be anything. */
+WEFT_INLINE terms terms_of(const weft_brdf_batch *b, int i, const weft_half *h, double lit)
 {
     const double rough = b->param[ROUGHNESS][i], metallic = b->param[METALLIC][i];
-    const double wl = weft_schlick_weight(h->nl), wv = weft_schlick_weight(h->nv);
+    const double nl = lit > 0 ? h->nl : 1, nh = lit > 0 ? h->nh : 1;
+    const double wl = weft_schlick_weight(nl), wv = weft_schlick_weight(h->nv);
     const double *const hv = h->h;
     double at, ab;
     terms t = {.weight = weft_schlick_weight(h->lh)};
     weft_disney_widths(rough, b->param[ANISOTROPIC][i], &at, &ab);
     const double fd = weft_disney_diffuse(wl, wv, h->lh, rough);
-    const double ss = weft_disney_subsurface(wl, wv, h->nl, h->nv, h->lh, rough);
-    t.diffuse = lerp(fd, ss, b->param[SUBSURFACE][i]) / WEFT_PI * (1 - metallic);
-    t.sheen = t.weight * b->param[SHEEN][i] * (1 - metallic);
+    const double ss = weft_disney_subsurface(wl, wv, nl, h->nv, h->lh, rough);
+    t.diffuse = lerp(fd, ss, b->param[SUBSURFACE][i]) / WEFT_PI * (1 - metallic) * lit;
+    t.sheen = lit * t.weight * b->param[SHEEN][i] * (1 - metallic);
     const double ag = (0.5 + rough / 2) * (0.5 + rough / 2); /* masking of a rougher lobe than D's */
     t.specular =
-        weft_ggx_d_aniso(hv[0], hv[1], h->nh, at, ab) * weft_ggx_v1(h->nl, ag) * weft_ggx_v1(h->nv, ag);
-    const double coat = weft_disney_gtr1(h->nh, h->s2, lerp(0.1, 0.001, b->param[CLEARCOAT_GLOSS][i]));
-    t.clearcoat = 0.25 * b->param[CLEARCOAT][i] * weft_fresnel_schlick(0.04, h->lh) * coat *
-                  weft_ggx_v1(h->nl, 0.25) * weft_ggx_v1(h->nv, 0.25);
+        lit * weft_ggx_d_aniso(hv[0], hv[1], nh, at, ab) * weft_ggx_v1(nl, ag) * weft_ggx_v1(h->nv, ag);
+    const double coat = weft_disney_gtr1(nh, h->s2, lerp(0.1, 0.001, b->param[CLEARCOAT_GLOSS][i]));
+    t.clearcoat = lit * 0.25 * b->param[CLEARCOAT][i] * weft_fresnel_schlick(0.04, h->lh) * coat *
+                  weft_ggx_v1(nl, 0.25) * weft_ggx_v1(h->nv, 0.25);
     return t;
 }
 
 /* f = [lerp(Fd, ss, subsurface) C/pi + sheen] (1 - metallic) + Gs Fs Ds + clearcoat/4 Gr Fr Dr, S-BLG-05.
  * Below either horizon it is 0, as published: no raised n.v. */
+WEFT_CLONES
 static void eval(const weft_brdf_batch *b, double *const value[3])
 {
+    WEFT_INDEPENDENT
     for (int i = 0; i < b->n; i++) {
         const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
                                          b->view[1][i], b->view[2][i]);
-        const bool lit = h.valid > 0 && b->view[2][i] > 0;
-        const terms t = lit ? terms_of(b, i, &h) : (terms){0};
+        const terms t = terms_of(b, i, &h, b->view[2][i] > 0 ? h.valid : 0);
         const double luminance =
             0.3 * b->param[BASE][i] + 0.6 * b->param[BASE + 1][i] + 0.1 * b->param[BASE + 2][i];
         for (int c = 0; c < 3; c++) {
-            const double base = b->param[BASE + c][i], tint = luminance > 0 ? base / luminance : 1;
+            const double base = b->param[BASE + c][i],
+                         tint = luminance > 0 ? base / (luminance > 0 ? luminance : 1) : 1;
             const double dielectric =
                 0.08 * b->param[SPECULAR][i] * lerp(1, tint, b->param[SPECULAR_TINT][i]);
             const double f0 = lerp(dielectric, base, b->param[METALLIC][i]);

@@ -3,6 +3,7 @@
 #define WEFT_SHADING_BRDF_DISNEY_H
 
 #include "shading/brdf/ggx.h"
+#include "shading/brdf/log_positive.h"
 
 /** One factor of the two lobes of retro-reflection: 1 + (f90 - 1) w, w = Schlick's weight of a cosine. */
 static inline double weft_disney_edge(double f90, double w)
@@ -30,7 +31,7 @@ static inline double weft_disney_subsurface(double wl, double wv, double nl, dou
 static inline double weft_disney_gtr1(double nh, double s2, double a)
 {
     const double a2 = a * a;
-    return (a2 - 1) / (WEFT_PI * log(a2) * (a2 * nh * nh + s2));
+    return (a2 - 1) / (WEFT_PI * weft_log_positive(a2) * (a2 * nh * nh + s2));
 }
 
 /** Widths along tangent and bitangent: aspect = sqrt(1 - 0.9 anisotropic), not below 0.001. */

@@ -1,4 +1,5 @@
-/** exp(x) for x <= 0 in plain arithmetic, so that loops around it become vector code; libm's is a call. */
+/** exp(x), above all for x <= 0, in plain arithmetic, so that loops around it become vector code; libm's is a
+ * call. */
 #ifndef WEFT_SHADING_BRDF_EXP_NEGATIVE_H
 #define WEFT_SHADING_BRDF_EXP_NEGATIVE_H
 
@@ -6,7 +7,7 @@
 #include <string.h>
 
 /**
- * e^x, x <= 0; relative error below 2e-16 (measured against expl) down to -708, where it stays (3e-308, a
+ * e^x, x < 700; relative error below 2e-16 (measured against expl) down to -708, where it stays (3e-308, a
  * caller's 0).
  *
  * x = k ln 2 + r with |r| <= ln(2)/2: the power series of e^r to the 13th term (the rest is below 5e-18),

@@ -3,6 +3,7 @@
 
 #include "shading/brdf/albedo.h"
 #include "shading/brdf/half_vector.h"
+#include "shading/brdf/log_positive.h"
 #include "shading/brdf/sampling.h"
 
 #include <math.h>
@@ -318,6 +319,23 @@ static void test_samples_follow_the_density(void **state)
         }
 }
 
+/* What vector code uses in place of libm, against libm. */
+static void test_logarithm_and_exponential(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    for (int i = 0; i < 200000; i++) {
+        const double t = pow(weft_test_random(&random), i % 40 + 1), x = exp(between(&random, -690, 690));
+        if (t < 1)
+            assert_near(weft_log_one_minus(t), log1p(-t), 6e-16 * -log1p(-t) + 1e-320);
+        assert_near(weft_log_positive(x), log(x), 6e-16 * fabs(log(x)) + 1e-16);
+        const double y = between(&random, -700, 700);
+        assert_near(weft_exp_negative(y) / exp(y), 1, 5e-16);
+    }
+    assert_near(weft_log_one_minus(0), 0, 0);
+    assert_true(exp(weft_log_one_minus(1)) < 1e-300 && exp(weft_log_positive(0)) < 1e-300);
+}
+
 static double albedo_of(const char *name, const char *const *settings, double nv)
 {
     const weft_brdf *brdf = NULL;
@@ -382,6 +400,7 @@ int main(void)
         cmocka_unit_test(test_furnace),
         cmocka_unit_test(test_density_integrates_to_one),
         cmocka_unit_test(test_samples_follow_the_density),
+        cmocka_unit_test(test_logarithm_and_exponential),
         cmocka_unit_test(test_albedos_known_from_elsewhere),
         cmocka_unit_test(test_parameters_are_set_by_name),
     };
