@@ -199,12 +199,13 @@ static bool is_text(void)
     return frame.n > 0 && frame.bytes[0] > WEFT_FRAME_WIRE_MAX;
 }
 
-static void take_byte(uint8_t byte)
+/* @return whether it ended a frame or a line */
+static bool take_byte(uint8_t byte)
 {
     const bool rest_of_line_end = byte == '\n' && frame.after_return;
     frame.after_return = byte == '\r' && is_text();
     if (rest_of_line_end)
-        return;
+        return false;
     if (byte == 0) {
         if (frame.n > 0)
             take_frame();
@@ -216,10 +217,11 @@ static void take_byte(uint8_t byte)
             frame.bytes[frame.n++] = byte;
         else
             frame.too_long = true;
-        return;
+        return false;
     }
     frame.n = 0;
     frame.too_long = false;
+    return true;
 }
 
 bool fw_link_has_bytes(void)
@@ -229,13 +231,16 @@ bool fw_link_has_bytes(void)
 
 void fw_link_poll(void)
 {
-    while (fw_link_has_bytes()) {
+    /* One frame at a time, and no more bytes than the ring holds: a flood must not keep the loop from the
+     * lamps' time limits and the watchdog. */
+    for (uint8_t i = 0; i < FW_RX_RING; i++) {
         fw_safety_poll(); /* a panic or the end of the lease comes before the command behind it */
         if (!fw_link_has_bytes())
             break;
         const uint8_t byte = rx.bytes[rx.tail];
         rx.tail = (uint8_t)(rx.tail + 1) & (FW_RX_RING - 1);
-        take_byte(byte);
+        if (take_byte(byte))
+            break;
     }
 }
 

@@ -21,7 +21,7 @@ bool fw_link_next_byte(uint8_t *byte);
 /** Whether received bytes wait.  With interrupts locked or not. */
 bool fw_link_has_bytes(void);
 
-/** Answers what has come in; from the loop. */
+/** Answers the next of what has come in; from the loop. */
 void fw_link_poll(void);
 
 /** Forgets the bytes that came before the last panic; from the loop, through fw_safety_poll(). */

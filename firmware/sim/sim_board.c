@@ -26,12 +26,14 @@ void sim_board_start(void)
 
 void sim_board_turn(void)
 {
-    fw_link_poll();
-    fw_light_poll();
-    fw_sequence_poll();
-    fw_safety_poll();
-    fw_board_watchdog_feed();
-    assert(sim.locked == 0);
+    do {
+        fw_link_poll();
+        fw_light_poll();
+        fw_sequence_poll();
+        fw_safety_poll();
+        fw_board_watchdog_feed();
+        assert(sim.locked == 0);
+    } while (fw_link_has_bytes()); /* the board does not sleep then */
 }
 
 void sim_board_pass_ms(int ms)

@@ -38,7 +38,7 @@ extern uint8_t sim_eeprom[SIM_EEPROM_BYTES];
 /** A reset: variables of the firmware as after power-on, the board dark, time 0. */
 void sim_board_start(void);
 
-/** One turn of the firmware's loop. */
+/** Turns of the firmware's loop until it would sleep. */
 void sim_board_turn(void);
 
 /** The exposure line changes; the firmware sees it when it watches. */

@@ -12,7 +12,7 @@
 
 /* How long the n-th try waits for its reply.  A board answers within a millisecond: the waits are for
  * damaged frames and for a busy computer. */
-static const int try_ms[] = {50, 100, 200, 400};
+static const int try_ms[] = {30, 30, 40, 50, 50, 100, 100, 150, 200, 200};
 enum { N_TRIES = sizeof try_ms / sizeof try_ms[0] };
 
 static const double hello_every_s = 0.2, hello_within_s = 3; /* an Uno's bootloader takes up to 1.5 s */

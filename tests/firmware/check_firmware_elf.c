@@ -349,6 +349,30 @@ static void test_flood_does_no_harm(void **state)
     assert_true(status().crc_errors > 0);
 }
 
+/* Commands without a pause, faster than they can be answered: the time limit of the lights holds, and the
+ * watchdog has no reason. */
+static void test_flood_of_commands_delays_nothing(void **state)
+{
+    (void)state;
+    uint8_t wire[WEFT_FRAME_WIRE_MAX], rest[256];
+    weft_controller_sim_counters c;
+    take_lease(5000);
+    assert_int_equal(light(1 << 8, 256, 300), WEFT_STATUS_OK);
+    const double begin_ms = now_ms();
+    for (int i = 0; i < 5000; i++)
+        weft_controller_sim_send(sim, wire, request(wire, (uint8_t)i, WEFT_CMD_STATUS, "", 0));
+    weft_controller_sim_run(sim, 900e3);
+    assert_int_equal(lights(), 0);
+    assert_true(off_at_ms() - begin_ms < 302);
+    weft_controller_sim_send(sim, (const uint8_t *)"", 1); /* ends a frame that has lost its end */
+    weft_controller_sim_run(sim, 100e3);
+    weft_controller_sim_get_counters(sim, &c);
+    assert_int_equal(c.resets, 0);
+    while (weft_controller_sim_receive(sim, rest, sizeof rest))
+        ;
+    assert_true(status().overruns > 0); /* it was a flood */
+}
+
 static void test_watchdog_ends_a_hang_in_darkness(void **state)
 {
     (void)state;
@@ -498,6 +522,7 @@ int main(void)
         TEST(test_damaged_frames_are_never_run),
         TEST(test_unknown_and_foreign_commands),
         TEST(test_flood_does_no_harm),
+        TEST(test_flood_of_commands_delays_nothing),
         TEST(test_watchdog_ends_a_hang_in_darkness),
         TEST(test_panic_works_while_the_program_hangs),
         TEST(test_reset_button),

@@ -171,7 +171,7 @@ static void test_no_light_between_panic_and_its_notice(void **state)
 {
     (void)state;
     take_lease(1000);
-    fw_safety_panic();
+    hear((const uint8_t *)"\0\0\0", 3);
     assert_false(fw_light_set(1, 256, 100));
     assert_int_equal(sim.mask, 0);
     assert_int_equal(sim.lit, 0);
