@@ -30,7 +30,7 @@ weft_err weft_import_list_add(weft_import_list *list, const char *path, weft_vec
 /** Takes mask.png of `folder` when it is there. */
 weft_err weft_import_find_mask(weft_import_list *list, const char *folder, weft_error *err);
 
-/** Reads an RTI light-position file. */
+/** Reads an RTI light-position file into an uninitialised list, as the two below do. */
 weft_err weft_import_read_lp(const char *path, weft_import_list *list, weft_error *err);
 /** Reads a folder with light_directions.txt. */
 weft_err weft_import_read_directions(const char *folder, weft_import_list *list, weft_error *err);

@@ -1,16 +1,22 @@
 /*
- * libFuzzer over every reader of files.  One program per reader, chosen by WEFT_FUZZ_READER; the bytes go
- * through a memory file, so that the real reader opens a real path.  A crash, a sanitizer report or a
- * read that never ends is a defect; an error is what damaged bytes are supposed to give.
+ * libFuzzer over every reader of files, and the wire.  One program per reader, chosen by WEFT_FUZZ_READER;
+ * the bytes go through a memory file, so that the real reader opens a real path.  A crash, a sanitizer report
+ * or a read that never ends is a defect; an error is what damaged bytes are supposed to give.
  */
+#include "calibration/calibration.h"
 #include "core/formats/exr_file.h"
 #include "core/formats/png_file.h"
 #include "core/formats/raw_file.h"
 #include "core/formats/tiff_file.h"
+#include "core/log.h"
 #include "core/mem.h"
+#include "firmware/protocol.h"
+#include "host/set/import_list.h"
+#include "host/set/set.h"
 
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -47,6 +53,62 @@ static void read_raw(const char *path)
     weft_frame_info info;
     if (weft_raw_read(path, &mosaic, &info, NULL) == WEFT_OK)
         weft_mosaic_fini(&mosaic);
+}
+
+/* A folder that holds the input under `name`, by a link; the same at each call. */
+static const char *folder_with(const char *name, const char *path)
+{
+    static char folder[32] = "";
+    char link[64];
+    if (!folder[0]) {
+        snprintf(folder, sizeof folder, "/tmp/weft-fuzz-XXXXXX");
+        if (!mkdtemp(folder))
+            abort();
+    }
+    snprintf(link, sizeof link, "%s/%s", folder, name);
+    unlink(link);
+    if (symlink(path, link) != 0)
+        abort();
+    return folder;
+}
+
+static void read_set(const char *path)
+{
+    weft_set set;
+    if (weft_set_load(folder_with("set.json", path), &set, NULL) == WEFT_OK)
+        weft_set_fini(&set);
+}
+
+static void read_calibration(const char *path)
+{
+    weft_calibration cal;
+    if (weft_calibration_load(folder_with("calibration.json", path), &cal, NULL) == WEFT_OK)
+        weft_calibration_fini(&cal);
+}
+
+static void read_lp(const char *path)
+{
+    weft_import_list list;
+    weft_log_set_level(WEFT_LOG_QUIET);
+    if (weft_import_read_lp(path, &list, NULL) == WEFT_OK)
+        weft_import_list_fini(&list);
+}
+
+/* The wire: a decoded frame encodes to bytes that decode to the same frame. */
+static void read_wire(const char *path)
+{
+    uint8_t bytes[512], wire[WEFT_FRAME_WIRE_MAX];
+    weft_frame frame, again;
+    FILE *const file = fopen(path, "rb");
+    const size_t n = file ? fread(bytes, 1, sizeof bytes, file) : 0;
+    if (file)
+        fclose(file);
+    if (weft_frame_decode(bytes, n, &frame) != WEFT_FRAME_GOOD)
+        return;
+    const uint8_t length = weft_frame_encode(&frame, wire);
+    if (weft_frame_decode(wire, (size_t)length - 1, &again) != WEFT_FRAME_GOOD || again.n != frame.n ||
+        again.crc != frame.crc)
+        abort();
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n);

@@ -1,11 +1,11 @@
-/* fuzz_seeds FOLDER: writes small valid files for the fuzzers to start from: FOLDER/png/..., tiff, exr, raw.
+/* fuzz_seeds FOLDER: writes small valid files for the fuzzers to start from: FOLDER/png/..., tiff, ...
  */
 #include "core/file.h"
 #include "core/formats/exr_file.h"
 #include "core/formats/png_file.h"
 #include "core/formats/tiff_file.h"
 #include "core/log.h"
-#include "core/mem.h"
+#include "firmware/protocol.h"
 
 #include <stdio.h>
 
@@ -75,6 +75,40 @@ static weft_err write_raws(const char *folder, weft_error *err)
     return status;
 }
 
+static weft_err write_texts(const char *folder, weft_error *err)
+{
+    static const char lp[] = "2\na.png 0 0 1\n\"b c.png\" 0,6 0 0.8\n";
+    static const char set[] =
+        "{\"weft\":\"set\",\"version\":1,\"name\":\"s\",\"created\":\"2026-11-23T10:00:00Z\",\"camera\":{},"
+        "\"sensor\":{\"width\":32,\"height\":24,\"cfa\":\"RGGB\",\"black\":[0,0,0,0],\"white\":4095},"
+        "\"frames\":[{\"file\":\"a.dng\",\"role\":\"light\",\"light\":0,\"exposure_s\":0.1,\"gain\":1.0}],"
+        "\"state\":\"complete\"}";
+    static const char cal[] =
+        "{\"weft\":\"calibration\",\"version\":1,\"lights\":[{\"position_mm\":[0,0,300],\"axis\":[0,0,-1],"
+        "\"exponent\":1,\"intensity\":[1,1,1]}]}";
+    const struct {
+        const char *reader, *text;
+        size_t n;
+    } texts[] = {
+        {"lp", lp, sizeof lp - 1}, {"set", set, sizeof set - 1}, {"calibration", cal, sizeof cal - 1}};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        char path[1024];
+        WEFT_TRY(seed_path(folder, texts[i].reader, "small", path, err));
+        WEFT_TRY(weft_file_write(path, texts[i].text, texts[i].n, err));
+    }
+    return WEFT_OK;
+}
+
+static weft_err write_wire(const char *folder, weft_error *err)
+{
+    const weft_frame frame = {.version = 1, .n = 3, .payload = {1, 0, 2}};
+    uint8_t wire[WEFT_FRAME_WIRE_MAX];
+    char path[1024];
+    const size_t n = weft_frame_encode(&frame, wire);
+    WEFT_TRY(seed_path(folder, "wire", "frame", path, err));
+    return weft_file_write(path, wire, n - 1, err);
+}
+
 int main(int argc, char **argv)
 {
     weft_error error = {0};
@@ -87,6 +121,10 @@ int main(int argc, char **argv)
         status = write_exrs(argv[1], &error);
     if (status == WEFT_OK)
         status = write_raws(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_texts(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_wire(argv[1], &error);
     if (status != WEFT_OK)
         weft_log_error("%s", error.text);
     return weft_err_exit_status(status);
