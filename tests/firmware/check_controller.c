@@ -310,12 +310,15 @@ static void test_settings_stay_and_tell_who_it_is(void **state)
 
 /* -- a host that dies ----------------------------------------------------------------------------------- */
 
+enum { BUSY_LEASE_MS = 100 };
+
 /* This program again, as a host that lights two lamps, says so and then does as told. */
 static int be_a_host(const char *port, const char *how)
 {
     weft_controller *c = NULL;
     weft_error error = {0};
-    if (weft_controller_open(port, 1000, &c, &error) != WEFT_OK ||
+    const int lease_ms = strcmp(how, "busy") == 0 ? BUSY_LEASE_MS : 1000;
+    if (weft_controller_open(port, lease_ms, &c, &error) != WEFT_OK ||
         weft_controller_light(c, 0x21, 256, 2000, NULL, &error) != WEFT_OK) {
         fprintf(stderr, "%s\n", error.text);
         return 1;
@@ -325,6 +328,9 @@ static int be_a_host(const char *port, const char *how)
         return 1;
     if (strcmp(how, "abort") == 0)
         abort();
+    for (uint32_t i = 0; strcmp(how, "busy") == 0; i++)
+        if (weft_controller_light(c, 1u << i % 10, 256, 2000, NULL, &error) != WEFT_OK)
+            return 1;
     for (;;)
         pause();
 }
@@ -378,6 +384,41 @@ static void test_killed_host_leaves_darkness_within_a_second(void **state)
     close(pipe_end);
     weft_controller *const c = open_it(1000); /* the next host finds the port free */
     weft_controller_close(c);
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* A host that sends one command after the other, killed by the system at a random moment.  Its last words may
+ * still be on their way through the pty when it dies: 20 ms for them and for the board. */
+static void test_a_host_killed_at_100_random_moments(void **state)
+{
+    (void)state;
+    double took_s[100];
+    uint64_t seed = 4;
+    int n = 0;
+    for (int tries = 0; n < 100; tries++) {
+        int pipe_end, how;
+        assert_true(tries < 200);
+        const pid_t child = start_host("busy", &pipe_end);
+        wait_until_lit(pipe_end);
+        sleep_ms((int)(weft_test_random(&seed) * 60));
+        kill(child, SIGKILL);
+        assert_int_equal(waitpid(child, &how, 0), child);
+        const double killed_s = weft_controller_sim_time_s(sim);
+        close(pipe_end);
+        const double dark_s = wait_until_dark_s(killed_s);
+        if (WIFSIGNALED(how) && WTERMSIG(how) == SIGKILL) /* or the machine was too busy for its lease */
+            took_s[n++] = dark_s;
+    }
+    qsort(took_s, 100, sizeof *took_s, by_size);
+    print_message(
+        "lease %d ms, host killed 100 times: dark after %.1f ms at least, %.1f median, %.1f at most\n",
+        BUSY_LEASE_MS, 1e3 * took_s[0], 1e3 * took_s[50], 1e3 * took_s[99]);
+    assert_true(1e3 * took_s[99] <= BUSY_LEASE_MS + 20);
 }
 
 static void test_crashed_host_leaves_darkness_at_once(void **state)
@@ -539,6 +580,9 @@ int main(int argc, char **argv)
     if (argc == 4 && strcmp(argv[1], "host") == 0)
         return be_a_host(argv[2], argv[3]);
 #define TEST(name) cmocka_unit_test_setup_teardown(name, start, stop)
+    const struct CMUnitTest slow_tests[] = {TEST(test_a_host_killed_at_100_random_moments)};
+    if (argc == 2 && strcmp(argv[1], "slow") == 0)
+        return cmocka_run_group_tests(slow_tests, NULL, NULL);
     const struct CMUnitTest tests[] = {
         TEST(test_open_light_status_close),
         TEST(test_values_out_of_range),
