@@ -1,5 +1,5 @@
 /*
- * libFuzzer over every reader of files, and the wire.  One program per reader, chosen by WEFT_FUZZ_READER;
+ * libFuzzer over every reader of files.  One program per reader, chosen by WEFT_FUZZ_READER;
  * the bytes go through a memory file, so that the real reader opens a real path.  A crash, a sanitizer report
  * or a read that never ends is a defect; an error is what damaged bytes are supposed to give.
  */
@@ -10,7 +10,6 @@
 #include "core/formats/tiff_file.h"
 #include "core/log.h"
 #include "core/mem.h"
-#include "firmware/protocol.h"
 #include "host/set/import_list.h"
 #include "host/set/set.h"
 
@@ -92,23 +91,6 @@ static void read_lp(const char *path)
     weft_log_set_level(WEFT_LOG_QUIET);
     if (weft_import_read_lp(path, &list, NULL) == WEFT_OK)
         weft_import_list_fini(&list);
-}
-
-/* The wire: a decoded frame encodes to bytes that decode to the same frame. */
-static void read_wire(const char *path)
-{
-    uint8_t bytes[512], wire[WEFT_FRAME_WIRE_MAX];
-    weft_frame frame, again;
-    FILE *const file = fopen(path, "rb");
-    const size_t n = file ? fread(bytes, 1, sizeof bytes, file) : 0;
-    if (file)
-        fclose(file);
-    if (weft_frame_decode(bytes, n, &frame) != WEFT_FRAME_GOOD)
-        return;
-    const uint8_t length = weft_frame_encode(&frame, wire);
-    if (weft_frame_decode(wire, (size_t)length - 1, &again) != WEFT_FRAME_GOOD || again.n != frame.n ||
-        again.crc != frame.crc)
-        abort();
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n);

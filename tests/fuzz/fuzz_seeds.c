@@ -99,13 +99,13 @@ static weft_err write_texts(const char *folder, weft_error *err)
     return WEFT_OK;
 }
 
-static weft_err write_wire(const char *folder, weft_error *err)
+static weft_err write_frame(const char *folder, weft_error *err)
 {
     const weft_frame frame = {.version = 1, .n = 3, .payload = {1, 0, 2}};
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
     char path[1024];
     const size_t n = weft_frame_encode(&frame, wire);
-    WEFT_TRY(seed_path(folder, "wire", "frame", path, err));
+    WEFT_TRY(seed_path(folder, "frame", "small", path, err));
     return weft_file_write(path, wire, n - 1, err);
 }
 
@@ -124,7 +124,7 @@ int main(int argc, char **argv)
     if (status == WEFT_OK)
         status = write_texts(argv[1], &error);
     if (status == WEFT_OK)
-        status = write_wire(argv[1], &error);
+        status = write_frame(argv[1], &error);
     if (status != WEFT_OK)
         weft_log_error("%s", error.text);
     return weft_err_exit_status(status);
