@@ -59,9 +59,8 @@ static slot_kind look_at_slot(uint8_t slot, uint8_t *bytes)
     if (length > LONGEST)
         return SLOT_DAMAGED;
     const uint8_t *const end = bytes + HEAD + length;
-    return weft_crc16(bytes + 1, (size_t)(HEAD - 1 + length)) == (uint16_t)(end[0] | end[1] << 8)
-               ? SLOT_WHOLE
-               : SLOT_DAMAGED;
+    return weft_crc16(bytes + 1, HEAD - 1u + length) == (uint16_t)(end[0] | end[1] << 8) ? SLOT_WHOLE
+                                                                                         : SLOT_DAMAGED;
 }
 
 static void unpack(const uint8_t *p)
@@ -131,7 +130,7 @@ static bool store(const fw_settings_values *v)
     bytes[SLOT - 1] = (uint8_t)(crc >> 8);
     const uint16_t place = (uint16_t)(slot * SLOT_PLACE);
     fw_board_eeprom_write(place, 0xff);
-    for (uint8_t i = 1; i < SLOT; i++)
+    for (int i = 1; i < SLOT; i++)
         fw_board_eeprom_write((uint16_t)(place + i), bytes[i]);
     fw_board_eeprom_write(place, MAGIC);
     read_slot(slot, back, SLOT);

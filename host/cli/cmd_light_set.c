@@ -64,7 +64,8 @@ static weft_err parse_serial(const char *text, uint8_t value[8], weft_error *err
         return weft_fail(
             err, WEFT_ERR_USAGE,
             "\"%s\" is no serial number: wanted up to 8 letters, digits and signs without spaces", text);
-    memcpy(value, text, n);
+    for (size_t i = 0; i < n; i++) /* NUL behind it only where there is room */
+        value[i] = (uint8_t)text[i];
     return WEFT_OK;
 }
 

@@ -362,7 +362,7 @@ static void test_noise_lights_nothing(void **state)
 {
     (void)state;
     const char *const asked = getenv("WEFT_FUZZ_FRAMES");
-    const long n_frames = asked ? atol(asked) : 60000;
+    const long n_frames = asked ? strtol(asked, NULL, 10) : 60000;
     oracle o = {0};
     weft_controller_sim_counters c;
     long sent = 0, rounds = 0;
