@@ -44,9 +44,9 @@ static weft_err make_line(const char *tell, char line[2 * PATH_MAX], weft_error 
     if (strncmp(tell, truth, strlen(truth)) == 0 && rest[0] != '/' && rest[0] != '\0') {
         if (!getcwd(folder, sizeof folder))
             return weft_fail_errno(err, WEFT_ERR_IO, "the current folder has no name; give an absolute one");
-        n = snprintf(line, 2 * PATH_MAX, "%s%s/%s", truth, folder, rest);
+        n = snprintf(line, (size_t)2 * PATH_MAX, "%s%s/%s", truth, folder, rest);
     } else {
-        n = snprintf(line, 2 * PATH_MAX, "%s", tell);
+        n = snprintf(line, (size_t)2 * PATH_MAX, "%s", tell);
     }
     return n < 2 * PATH_MAX ? WEFT_OK : weft_fail(err, WEFT_ERR_USAGE, "--tell: the command is too long");
 }

@@ -63,8 +63,9 @@ static double noise(uint64_t seed, int field, double x_mm, double y_mm, int nx, 
     double corner[2][2];
     for (int b = 0; b < 2; b++)
         for (int a = 0; a < 2; a++)
-            corner[b][a] = weft_rig_random(seed, STREAM_NOISE + 16 * (uint64_t)field,
-                                           (uint64_t)(wrap(j + b, ny) * nx + wrap(i + a, nx)));
+            corner[b][a] =
+                weft_rig_random(seed, STREAM_NOISE + 16 * (uint64_t)field,
+                                (uint64_t)wrap(j + b, ny) * (uint64_t)nx + (uint64_t)wrap(i + a, nx));
     const double top = corner[0][0] + sx * (corner[0][1] - corner[0][0]);
     const double bottom = corner[1][0] + sx * (corner[1][1] - corner[1][0]);
     return 2 * (top + sy * (bottom - top)) - 1;
@@ -357,13 +358,13 @@ static void lay_down(weft_fabric *cloth, uint64_t seed)
     }
     for (int term = 0; term < 3; term++) {
         const double wavelength = 35 + 25 * term;
-        const double angle = TWO_PI * weft_rig_random(seed, STREAM_WAVE, (uint64_t)(10 + term));
+        const double angle = TWO_PI * weft_rig_random(seed, STREAM_WAVE, 10 + (uint64_t)term);
         cloth->wave_k[term][0] = (float)(TWO_PI / wavelength * cos(angle));
         cloth->wave_k[term][1] = (float)(TWO_PI / wavelength * sin(angle));
         for (int c = 0; c < 2; c++) {
             cloth->wave[term][c][0] = (float)(0.10 + 0.08 * term);
             cloth->wave[term][c][1] =
-                (float)(TWO_PI * weft_rig_random(seed, STREAM_WAVE, (uint64_t)(20 + 2 * term + c)));
+                (float)(TWO_PI * weft_rig_random(seed, STREAM_WAVE, 20 + 2 * (uint64_t)term + (uint64_t)c));
         }
     }
 }

@@ -21,7 +21,7 @@ weft_fabric_patch weft_fabric_patch_at(const weft_fabric *cloth, float x, float 
     for (int term = 0; term < 3; term++) {
         const float *const k = cloth->wave_k[term];
         const float phase = k[0] * x + k[1] * y;
-        for (int i = 0; i < 2; i++) {
+        for (size_t i = 0; i < 2; i++) {
             const float amplitude = cloth->wave[term][i][0], at = phase + cloth->wave[term][i][1];
             const float slope = amplitude * cosf(at);
             p.at[i] += amplitude * sinf(at);

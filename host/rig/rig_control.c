@@ -179,7 +179,7 @@ weft_err weft_rig_control_run(weft_rig_control *control, weft_rig_obey_fn *obey,
         fds[0] = (struct pollfd){.fd = control->fd, .events = POLLIN};
         for (int i = 0; i < n; i++)
             fds[1 + i] = (struct pollfd){.fd = control->clients[i].fd, .events = POLLIN};
-        const int ready = poll(fds, (nfds_t)(1 + n), WAIT_MS);
+        const int ready = poll(fds, 1 + (nfds_t)n, WAIT_MS);
         if (!alive(context))
             return weft_fail(
                 err, WEFT_ERR_DEVICE,

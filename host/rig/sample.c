@@ -116,7 +116,8 @@ static bool in_view(const weft_rig_plate *plate, const weft_camera *camera, doub
 static void push(weft_rig_plate *plate, const weft_camera *camera, double dx, double dy)
 {
     const double margin = 0.008 * camera->width;
-    for (double step = 16; step > 0.2; step /= 2)
+    for (int halvings = 0; halvings < 7; halvings++) {
+        const double step = ldexp(16, -halvings); /* 16 mm down to 0.25 */
         for (;;) {
             const weft_vec3 before = plate->centre;
             plate->centre = weft_add(before, (weft_vec3){dx * step, dy * step, 0});
@@ -125,6 +126,7 @@ static void push(weft_rig_plate *plate, const weft_camera *camera, double dx, do
             plate->centre = before;
             break;
         }
+    }
 }
 
 /* Leans the plate by `tilt` towards azimuth `towards` after turning it by `roll`. */

@@ -165,8 +165,9 @@ static double brightest_sheet(const weft_rig_scene *scene)
     double brightest = 0;
     for (int i = 0; i < WEFT_RIG_N_LIGHTS; i++)
         for (int step = 0; step < 41 * 41; step++) {
-            const double u = (step % 41) / 40.0 * (scene->camera.width - 1);
-            const double v = (step / 41) / 40.0 * (scene->camera.height - 1);
+            const int column = step % 41, row = step / 41;
+            const double u = column / 40.0 * (scene->camera.width - 1);
+            const double v = row / 40.0 * (scene->camera.height - 1);
             weft_vec3 point, to_light;
             if (!weft_camera_to_plane(&scene->camera, u, v, 0, &point))
                 continue;

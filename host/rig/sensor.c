@@ -72,8 +72,11 @@ static double next_poisson(random_state *r, double mean)
         return mean + sqrt(mean) * next_normal(r);
     const double limit = exp(-mean);
     int count = 0;
-    for (double product = next_uniform(r); product > limit; product *= next_uniform(r))
+    double product = next_uniform(r);
+    while (product > limit) {
+        product *= next_uniform(r);
         count++;
+    }
     return count;
 }
 

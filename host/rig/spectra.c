@@ -40,7 +40,7 @@ static const char *parse_row(const char *p, double *values, int n)
 static weft_err load_table(const char *name, int n, weft_spectrum *const *columns, char names[][16],
                            weft_error *err)
 {
-    double row[1 + WEFT_SPECTRA_N_MACBETH];
+    double row[1 + WEFT_SPECTRA_N_MACBETH] = {0};
     assert(n < (int)(sizeof row / sizeof row[0]));
     const weft_embedded *const file = weft_embedded_find(weft_rig_data, name);
     assert(file);

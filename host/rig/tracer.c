@@ -13,7 +13,7 @@ weft_rig_projection weft_rig_project_to_plate(const weft_rig_plate *plate, weft_
     const double distance = weft_dot(n, to_plate), through = weft_dot(n, centre);
     const weft_vec3 axes[2] = {plate->ax, plate->ay};
     weft_rig_projection p;
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = 0; i < 2; i++) {
         const weft_vec3 a = axes[i];
         const double offset = -weft_dot(a, to_plate);
         p.h[3 * i] = offset * n.x + distance * a.x;

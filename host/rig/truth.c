@@ -24,8 +24,8 @@ static weft_err fill_grid(const weft_rig_scene *scene, weft_light_grid *grid, we
             const double u = i * (scene->camera.width - 1.0) / (GRID_COLUMNS - 1);
             const double v = j * (scene->camera.height - 1.0) / (GRID_ROWS - 1);
             const float gain = (float)weft_rig_vignetting(scene, u, v);
-            for (size_t k = 0; k < 3 * WEFT_RIG_N_LIGHTS; k++)
-                grid->gain[k * plane + (size_t)(j * GRID_COLUMNS + i)] = gain;
+            for (size_t k = 0; k < (size_t)3 * WEFT_RIG_N_LIGHTS; k++)
+                grid->gain[k * plane + (size_t)j * GRID_COLUMNS + (size_t)i] = gain;
         }
     return WEFT_OK;
 }
