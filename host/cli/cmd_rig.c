@@ -96,6 +96,10 @@ static weft_err become_rig(const weft_rig_options *o, weft_error *err)
         words[k++] = "--firmware";
         words[k++] = o->firmware;
     }
+    if (o->bootloader) {
+        words[k++] = "--bootloader";
+        words[k++] = o->bootloader;
+    }
     if (weft_log_get_level() != WEFT_LOG_NORMAL)
         words[k++] = weft_log_get_level() == WEFT_LOG_QUIET ? "--quiet" : "--verbose";
     words[k] = NULL;

@@ -4,7 +4,8 @@
  *
  * It runs in one of two ways:
  * - paced: an own thread keeps simulated time in step with the wall clock, and a host talks over a pty.
- *   Opening the pty resets the board, as DTR resets an Uno (without the wait for its bootloader);
+ *   Opening the pty resets the board, as DTR resets an Uno (without the wait for its bootloader, unless
+ *   it is given one);
  * - stepped: no thread, no pty; time passes only in weft_controller_sim_run(), thousands of times faster
  *   than a clock when the board sleeps, and the same way every time.  For tests.
  *
@@ -33,6 +34,17 @@ typedef struct weft_controller_sim weft_controller_sim;
  *  @param pty_path  gets the path that a host opens; room for 128 bytes */
 weft_err weft_controller_sim_create(const char *elf_path, weft_controller_sim **sim, char *pty_path,
                                     weft_error *err);
+
+/** What is in the flash memory when power comes on. */
+typedef struct weft_controller_sim_program {
+    const char *firmware;   /* .elf or .hex; NULL: none */
+    const char *bootloader; /* .hex; NULL: none, a reset starts the firmware */
+} weft_controller_sim_program;
+
+/** As weft_controller_sim_create().  With a bootloader a reset starts that, as on an Arduino, and avrdude
+ *  programs the board over the pty; a program that runs into nonsense then waits there for the next reset. */
+weft_err weft_controller_sim_create_with(const weft_controller_sim_program *program,
+                                         weft_controller_sim **sim, char *pty_path, weft_error *err);
 
 /** Loads the ELF for stepped use; the board has just got its power. */
 weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controller_sim **sim, weft_error *err);
@@ -84,6 +96,9 @@ void weft_controller_sim_write_eeprom(weft_controller_sim *sim, const uint8_t by
 
 /** Power goes and comes back: RAM is lost, the EEPROM stays.  (A reset keeps both.) */
 void weft_controller_sim_power_cycle(weft_controller_sim *sim);
+
+/** From now on bit 0 of the flash memory's byte `address` is 0, whatever is written there. */
+void weft_controller_sim_wear_out(weft_controller_sim *sim, uint32_t address);
 
 /** Fills the free RAM between variables and stack with a pattern; then, later: the deepest that the stack
  *  has been since, in bytes from the end of RAM, and the bytes that were never touched.

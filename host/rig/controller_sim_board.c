@@ -5,7 +5,6 @@
 
 #include <simavr/avr_extint.h>
 #include <simavr/avr_timer.h>
-#include <simavr/sim_elf.h>
 
 #include <assert.h>
 #include <stdio.h>
@@ -98,7 +97,7 @@ static void keep_watchdog_on(avr_t *avr)
 /* A reset clears the simulator's timers and extint flags, and the ports change without a notice. */
 static void mend_after_reset(weft_controller_sim *sim)
 {
-    sim->was_reset = false;
+    sim->was_reset = sim->lost = false;
     sim->resets++;
     for (uint8_t i = 0; i < 2; i++) /* or it polls INT0 and INT1, lights of ours, at every cycle */
         avr_extint_set_strict_lvl_trig(sim->avr, i, 0);
@@ -146,12 +145,31 @@ static void watch_lock(weft_controller_sim *sim)
     }
 }
 
+/* A program that is broken off or missing runs into nonsense.  On the chip it stays there until a reset calls
+ * the bootloader, and so it does here; without a bootloader there is no way back. */
+static void lose_way(weft_controller_sim *sim)
+{
+    sim->lost = sim->has_bootloader;
+    sim->crashed = !sim->lost;
+}
+
+/* The chip's 10 000 erasures are over: a bit of it no longer takes a 1. */
+static void keep_worn_cell(const weft_controller_sim *sim)
+{
+    if (sim->has_worn_cell)
+        sim->avr->flash[sim->worn_cell] &= 0xfe;
+}
+
 /* Runs to `until` and not beyond: a timer there ends a sleep. */
 void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until)
 {
     avr_t *const avr = sim->avr;
     bool armed = false;
     while (avr->cycle < until && !sim->crashed) {
+        if (sim->lost) {
+            avr->cycle = until;
+            break;
+        }
         if (!armed)
             avr_cycle_timer_register(avr, until - avr->cycle, no_action, sim);
         armed = true;
@@ -160,7 +178,9 @@ void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until)
         const int state = avr_run(avr);
         if (sim->watch_lock)
             watch_lock(sim);
-        sim->crashed = state == cpu_Done || state == cpu_Crashed;
+        if (state == cpu_Done || state == cpu_Crashed)
+            lose_way(sim);
+        keep_worn_cell(sim);
         if (sim->was_reset) {
             mend_after_reset(sim);
             armed = false;
@@ -182,53 +202,7 @@ static void log_line(avr_t *avr, const int level, const char *format, va_list ar
     weft_explain("simavr: %s", text);
 }
 
-/* -- loading -------------------------------------------------------------------------------------------- */
-
-enum { ELF_MACHINE_AVR = 83 };
-
-/* libsimavr says little about a file that it does not like. */
-static weft_err check_elf(const char *path, weft_error *err)
-{
-    unsigned char head[20];
-    FILE *const file = fopen(path, "rb");
-    if (!file)
-        return weft_fail_errno(err, WEFT_ERR_IO,
-                               "%s: the firmware cannot be read (the build makes it: "
-                               "cmake --build build --target weft_firmware)",
-                               path);
-    const size_t n = fread(head, 1, sizeof head, file);
-    fclose(file);
-    if (n != sizeof head || memcmp(head, "\177ELF\1\1", 6) != 0 || head[18] != ELF_MACHINE_AVR)
-        return weft_fail(err, WEFT_ERR_FORMAT, "%s: this is no firmware for an AVR (wanted its .elf file)",
-                         path);
-    return WEFT_OK;
-}
-
-/* `ram_free` gets the end of the program's variables; 0 when the file does not say. */
-static weft_err load_elf(avr_t *avr, const char *path, uint32_t *ram_free, weft_error *err)
-{
-    elf_firmware_t elf;
-    memset(&elf, 0, sizeof elf);
-    const int failed = elf_read_firmware(path, &elf) != 0 || elf.flashsize == 0 ||
-                       elf.flashbase + elf.flashsize > avr->flashend + 1;
-    if (!failed) {
-        elf.frequency = WEFT_SIM_CLOCK_HZ;
-        avr_load_firmware(avr, &elf);
-    }
-    *ram_free = 0;
-    for (uint32_t i = 0; i < elf.symbolcount; i++) {
-        if (strcmp(elf.symbol[i]->symbol, "_end") == 0)
-            *ram_free = elf.symbol[i]->addr & 0xffff;
-        free(elf.symbol[i]);
-    }
-    free(elf.symbol);
-    free(elf.flash);
-    free(elf.eeprom);
-    if (failed)
-        return weft_fail(err, WEFT_ERR_FORMAT, "%s: the firmware is damaged or does not fit the ATmega328P",
-                         path);
-    return WEFT_OK;
-}
+/* -- starting ------------------------------------------------------------------------------------------- */
 
 static avr_timer_t *find_timer(avr_t *avr, char name)
 {
@@ -289,10 +263,9 @@ static void connect_board(weft_controller_sim *sim)
     sim->resets = 0;
 }
 
-weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controller_sim **out, weft_error *err)
+weft_err weft_sim_make(const weft_controller_sim_program *program, weft_controller_sim **out, weft_error *err)
 {
     avr_global_logger_set(log_line);
-    WEFT_TRY(check_elf(elf_path, err));
     weft_controller_sim *const sim = weft_alloc(1, sizeof *sim, err);
     if (!sim)
         return WEFT_ERR_NOMEM;
@@ -306,7 +279,8 @@ weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controlle
     if (status == WEFT_OK) {
         avr_init(sim->avr);
         sim->avr->log = LOG_ERROR;
-        status = load_elf(sim->avr, elf_path, &sim->ram_free, err);
+        sim->avr->frequency = WEFT_SIM_CLOCK_HZ;
+        status = weft_sim_load(sim, program, err);
     }
     if (status == WEFT_OK) {
         connect_board(sim);
@@ -315,6 +289,11 @@ weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controlle
         weft_controller_sim_destroy(sim);
     }
     return status;
+}
+
+weft_err weft_controller_sim_create_stepped(const char *elf_path, weft_controller_sim **sim, weft_error *err)
+{
+    return weft_sim_make(&(weft_controller_sim_program){.firmware = elf_path}, sim, err);
 }
 
 void weft_controller_sim_destroy(weft_controller_sim *sim)

@@ -107,11 +107,11 @@ static weft_err open_pty(weft_controller_sim *sim, char *pty_path, weft_error *e
     return WEFT_OK;
 }
 
-weft_err weft_controller_sim_create(const char *elf_path, weft_controller_sim **out, char *pty_path,
-                                    weft_error *err)
+weft_err weft_controller_sim_create_with(const weft_controller_sim_program *program,
+                                         weft_controller_sim **out, char *pty_path, weft_error *err)
 {
     weft_controller_sim *sim;
-    WEFT_TRY(weft_controller_sim_create_stepped(elf_path, &sim, err));
+    WEFT_TRY(weft_sim_make(program, &sim, err));
     weft_err status = open_pty(sim, pty_path, err);
     if (status == WEFT_OK) {
         sim->paced = true;
@@ -127,6 +127,13 @@ weft_err weft_controller_sim_create(const char *elf_path, weft_controller_sim **
     else
         weft_controller_sim_destroy(sim);
     return status;
+}
+
+weft_err weft_controller_sim_create(const char *elf_path, weft_controller_sim **sim, char *pty_path,
+                                    weft_error *err)
+{
+    return weft_controller_sim_create_with(&(weft_controller_sim_program){.firmware = elf_path}, sim,
+                                           pty_path, err);
 }
 
 static void wake_thread(const weft_controller_sim *sim)

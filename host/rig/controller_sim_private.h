@@ -42,6 +42,10 @@ struct weft_controller_sim {
     avr_irq_t *uart_input;
     void (*core_reset)(avr_t *avr);
     bool was_reset, crashed;
+    bool has_bootloader;
+    bool lost; /* in nonsense until the next reset: its program is broken off */
+    bool has_worn_cell;
+    uint32_t worn_cell;
 
     /* light */
     uint32_t lights;              /* on at this cycle */
@@ -104,6 +108,14 @@ void weft_sim_start_feeding(weft_controller_sim *sim);
 void weft_sim_press_reset(weft_controller_sim *sim);
 /** Runs to the cycle `until` and not beyond. */
 void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until);
+
+/** Makes the board with this in its flash memory; stepped, without mutex. */
+weft_err weft_sim_make(const weft_controller_sim_program *program, weft_controller_sim **sim,
+                       weft_error *err);
+
+/* -- flash memory (controller_sim_program.c) */
+
+weft_err weft_sim_load(weft_controller_sim *sim, const weft_controller_sim_program *program, weft_error *err);
 
 /* -- pace (controller_sim_pace.c) */
 

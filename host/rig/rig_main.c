@@ -194,7 +194,7 @@ static weft_err find_firmware(rig *r, weft_error *err)
     }
     if (!r->firmware)
         return WEFT_ERR_NOMEM;
-    if (!weft_file_exists(r->firmware))
+    if (strcmp(r->firmware, "none") != 0 && !weft_file_exists(r->firmware))
         return weft_fail(err, WEFT_ERR_MISSING,
                          "%s: no firmware there; build it (./dev build) or give --firmware ELF", r->firmware);
     return WEFT_OK;
@@ -265,7 +265,11 @@ static weft_err start(rig *r, weft_error *err)
     WEFT_TRY(weft_rig_control_create(r->socket_path, &r->control, err));
     weft_explain("rendering %s at %d x %d", options->sample, setup.size.width, setup.size.height);
     WEFT_TRY(weft_rig_stage_create(&setup, options->sample, &r->stage, err));
-    WEFT_TRY(weft_controller_sim_create(r->firmware, &r->sim, r->pty, err));
+    const weft_controller_sim_program program = {
+        .firmware = strcmp(r->firmware, "none") == 0 ? NULL : r->firmware,
+        .bootloader = options->bootloader,
+    };
+    WEFT_TRY(weft_controller_sim_create_with(&program, &r->sim, r->pty, err));
     WEFT_TRY(weft_rig_camera_create(options->address, options->dir, r->stage, r->sim, &r->camera, err));
     return announce(r, err);
 }

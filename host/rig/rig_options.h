@@ -5,7 +5,7 @@
 #include "core/fields.h"
 
 typedef struct weft_rig_options {
-    const char *dir, *scene, *sample, *address, *firmware;
+    const char *dir, *scene, *sample, *address, *firmware, *bootloader;
     weft_size size;
     int seed;        /* 0: the scene file's */
     int supersample; /* 0: the default */
@@ -55,9 +55,14 @@ typedef struct weft_rig_options {
          .min = 0,                                                                                           \
          .max = 9,                                                                                           \
          .help = "n x n rays in each photosite, 3 or more (0: 3)"},                                          \
+        {.key = "bootloader",                                                                                \
+         .type = WEFT_FIELD_TEXT,                                                                            \
+         .offset = WEFT_RIG_OPTION(args_type, member, bootloader),                                           \
+         .unit = "HEX",                                                                                      \
+         .help = "bootloader of the light controller, so that weft flash can program it"},                   \
     {                                                                                                        \
         .key = "firmware", .type = WEFT_FIELD_TEXT, .offset = WEFT_RIG_OPTION(args_type, member, firmware),  \
-        .unit = "ELF", .help = "firmware of the light controller (default: the one of this build)"           \
+        .unit = "ELF", .help = "firmware of the light controller (default: that of this build; none: an empty chip)"           \
     }
 
 #endif

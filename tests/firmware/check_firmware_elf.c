@@ -493,10 +493,15 @@ static void test_bad_files(void **state)
 {
     (void)state;
     weft_controller_sim *other = NULL;
+    char pty[128];
     assert_fails(weft_controller_sim_create_stepped("/nonexistent.elf", &other, err), WEFT_ERR_IO,
                  "/nonexistent.elf");
-    assert_fails(weft_controller_sim_create_stepped(elf_path("firmware/weft-firmware.hex"), &other, err),
-                 WEFT_ERR_FORMAT, "no firmware for an AVR");
+    const weft_controller_sim_program not_a_bootloader = {.bootloader =
+                                                              elf_path("firmware/weft-firmware.hex")};
+    assert_fails(weft_controller_sim_create_with(&not_a_bootloader, &other, pty, err), WEFT_ERR_FORMAT,
+                 "it begins at 0, not at 0x7000");
+    const weft_controller_sim_program no_hex = {.bootloader = elf_path("firmware/weft-firmware.elf")};
+    assert_fails(weft_controller_sim_create_with(&no_hex, &other, pty, err), WEFT_ERR_FORMAT, ".hex");
     assert_fails(weft_controller_sim_create_stepped("/proc/self/exe", &other, err), WEFT_ERR_FORMAT,
                  "no firmware for an AVR");
     assert_null(other);
