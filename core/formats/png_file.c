@@ -6,6 +6,7 @@
 
 #include <png.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 /* Deflate cannot do better than 1032 to 1: a header that promises more pixels than that is damaged, and is
  * refused before memory is asked for. */
@@ -199,32 +200,56 @@ static void write_with_libpng(png_job *job, const weft_raster *raster, uint8_t *
     png_write_end(job->png, job->info);
 }
 
+/* Writes to job->file, which stays open. */
+static weft_err write_stream(png_job *job, const weft_raster *raster)
+{
+    uint8_t *const line = weft_alloc((size_t)raster->width * (size_t)raster->channels, 2, job->err);
+    if (!line)
+        return WEFT_ERR_NOMEM;
+    job->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, job, on_error, on_warning);
+    job->info = job->png ? png_create_info_struct(job->png) : NULL;
+    if (job->info)
+        write_with_libpng(job, raster, line);
+    else
+        job->status = weft_fail(job->err, WEFT_ERR_NOMEM, "%s: no memory for libpng", job->path);
+    if (job->png)
+        png_destroy_write_struct(&job->png, &job->info);
+    weft_free(line);
+    return job->status;
+}
+
 weft_err weft_png_write(const char *path, const weft_raster *raster, weft_error *err)
 {
     weft_atomic a;
     WEFT_TRY(weft_atomic_file_begin(&a, path, err));
     png_job job = {.path = path, .err = err, .writing = true};
-    uint8_t *const line = weft_alloc((size_t)raster->width * (size_t)raster->channels, 2, err);
-    job.status = line ? WEFT_OK : WEFT_ERR_NOMEM;
-    if (line && !(job.file = fopen(a.temp_path, "wb")))
-        job.status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be written", path);
-    if (job.status == WEFT_OK) {
-        job.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning);
-        job.info = job.png ? png_create_info_struct(job.png) : NULL;
-        if (job.info)
-            write_with_libpng(&job, raster, line);
-        else
-            job.status = weft_fail(err, WEFT_ERR_NOMEM, "%s: no memory for libpng", path);
-    }
-    if (job.png)
-        png_destroy_write_struct(&job.png, &job.info);
-    if (job.file && fclose(job.file) != 0 && job.status == WEFT_OK)
-        job.status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be written; is the disk full?", path);
-    weft_free(line);
-    if (job.status == WEFT_OK)
+    job.file = fopen(a.temp_path, "wb");
+    weft_err status = job.file ? write_stream(&job, raster)
+                               : weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be written", path);
+    if (job.file && fclose(job.file) != 0 && status == WEFT_OK)
+        status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be written; is the disk full?", path);
+    if (status == WEFT_OK)
         return weft_atomic_commit(&a, err);
     weft_atomic_abort(&a);
-    return job.status;
+    return status;
+}
+
+weft_err weft_png_encode(const weft_raster *raster, weft_text_buffer *out)
+{
+    char *bytes = NULL;
+    size_t n = 0;
+    png_job job = {.path = "a picture in memory", .err = &out->failure, .writing = true};
+    if (out->failure.code != WEFT_OK)
+        return out->failure.code;
+    job.file = open_memstream(&bytes, &n);
+    weft_err status = job.file ? write_stream(&job, raster)
+                               : weft_fail(&out->failure, WEFT_ERR_NOMEM, "no memory for a picture");
+    if (job.file && fclose(job.file) != 0 && status == WEFT_OK)
+        status = weft_fail(&out->failure, WEFT_ERR_NOMEM, "no memory for a picture");
+    if (status == WEFT_OK)
+        weft_text_add_bytes(out, bytes, n);
+    free(bytes); /* of open_memstream, not of core/mem.h */
+    return weft_text_buffer_status(out, NULL);
 }
 
 weft_err weft_png_read_mask(const char *path, weft_mask *mask, weft_error *err)

@@ -3,11 +3,15 @@
 #define WEFT_CORE_FORMATS_PNG_FILE_H
 
 #include "core/formats/raster.h"
+#include "core/text_buffer.h"
 
 /** Reads a PNG; palettes and 1/2/4-bit greys are expanded.  WEFT_ERR_FORMAT names the file. */
 weft_err weft_png_read(const char *path, weft_raster *raster, weft_error *err);
 /** Writes a PNG of raster->bits, whole or not at all. */
 weft_err weft_png_write(const char *path, const weft_raster *raster, weft_error *err);
+
+/** Appends the bytes of a PNG file to `out`, where failures stick. */
+weft_err weft_png_encode(const weft_raster *raster, weft_text_buffer *out);
 
 /** Reads any PNG as a mask: non-zero luminance is inside. */
 weft_err weft_png_read_mask(const char *path, weft_mask *mask, weft_error *err);

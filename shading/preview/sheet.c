@@ -1,6 +1,7 @@
 #include "shading/preview/sheet.h"
 
 #include "core/colour.h"
+#include "core/colour_map.h"
 #include "core/mem.h"
 #include "shading/preview/font.h"
 
@@ -155,17 +156,10 @@ weft_err weft_sheet_show_normals(weft_image *picture, const weft_image *normal, 
     return WEFT_OK;
 }
 
-/* Nine stations of viridis (van der Walt and Smith 2015, CC0), 8-bit sRGB codes. */
 static void viridis(double t, float *r, float *g, float *b)
 {
-    static const int stations[9][3] = {{68, 1, 84},    {71, 44, 122},  {59, 81, 139},
-                                       {44, 113, 142}, {33, 144, 141}, {39, 173, 129},
-                                       {92, 200, 99},  {170, 220, 50}, {253, 231, 37}};
-    const double at = 8 * (t < 0 ? 0 : t > 1 ? 1 : t);
-    const int first = at < 7 ? (int)at : 7;
     double code[3];
-    for (int c = 0; c < 3; c++)
-        code[c] = (stations[first][c] + (at - first) * (stations[first + 1][c] - stations[first][c])) / 255;
+    weft_colour_map_get(WEFT_MAP_VIRIDIS, t, code);
     *r = (float)weft_srgb_decode(code[0]);
     *g = (float)weft_srgb_decode(code[1]);
     *b = (float)weft_srgb_decode(code[2]);
