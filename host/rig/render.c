@@ -41,6 +41,8 @@ typedef struct render_job {
     weft_rig_tracer tracer;
     weft_rig_projection shadow[WEFT_RIG_N_LIGHTS]; /* of the plate, from each lamp */
     bool plate_is_raised;
+    int strip;       /* material of the white strip, -1 without */
+    float finest_mm; /* side of the smallest feature of a plate's pattern */
     lane_colours *colours;
     lane_lamps lamps;
     weft_fabric_gloss gloss;
@@ -126,6 +128,25 @@ INLINE void aim_lamps(const lane_lamps *lamps, const weft_rig_hit *hit, lane_ray
         rays->strength[i] = 0;
 }
 
+/* A ball hides a lamp from a point when the ray passes within its radius, ahead of the point. */
+INLINE void cast_ball_shadows(const weft_rig_sample *sample, const weft_rig_hit *hit, const lane_rays *rays,
+                              float visible[LANES])
+{
+    for (int b = 0; b < sample->n_balls; b++) {
+        const weft_rig_ball *const ball = &sample->balls[b];
+        const float x = (float)ball->x - hit->x, y = (float)ball->y - hit->y,
+                    z = (float)ball->radius - hit->z;
+        const float r2 = (float)(ball->radius * ball->radius), d2 = x * x + y * y + z * z;
+        if (d2 < r2 * 1.0001F) /* the point is this ball's own: facing away was dealt with */
+            continue;
+        for (int i = 0; i < LANES; i++) {
+            const float along = x * rays->x[i] + y * rays->y[i] + z * rays->z[i];
+            if (along > 0 && d2 - along * along < r2)
+                visible[i] = 0;
+        }
+    }
+}
+
 /* 1 where the lamp sees the point, 0 where something is between. */
 INLINE void cast_shadows(const render_job *job, const weft_fabric_patch *patch, const weft_rig_hit *hit,
                          const lane_rays *rays, float visible[LANES])
@@ -133,7 +154,9 @@ INLINE void cast_shadows(const render_job *job, const weft_fabric_patch *patch, 
     for (int i = 0; i < LANES; i++) /* what faces away needs no shadow; idle lanes have no strength */
         visible[i] =
             rays->strength[i] > 0 && hit->nx * rays->x[i] + hit->ny * rays->y[i] + hit->nz * rays->z[i] > 0;
-    if (job->sample->has_cloth) {
+    if (job->sample->n_balls) {
+        cast_ball_shadows(job->sample, hit, rays, visible);
+    } else if (job->sample->has_cloth && hit->material != job->strip) {
         weft_fabric_see(&job->sample->cloth, patch, &hit->cloth, rays->x, rays->y, rays->z, visible);
     } else if (job->plate_is_raised && hit->material == 0) {
         const weft_rig_plate *const plate = &job->sample->plate;
@@ -182,7 +205,7 @@ INLINE void shade(const render_job *job, const weft_fabric_patch *patch, const w
 {
     float visible[LANES], mirror[LANES] = {0};
     cast_shadows(job, patch, hit, rays, visible);
-    if (job->gloss.f0 > 0)
+    if (job->gloss.f0 > 0 && hit->material != job->strip && (!job->sample->n_balls || hit->material == 1))
         add_mirror(&job->gloss, hit, eye, rays, mirror);
     const float *const diffuse = job->colours->diffuse[hit->material][colour];
     const float *const bounce = job->colours->bounce[hit->material][colour];
@@ -197,9 +220,32 @@ INLINE void shade(const render_job *job, const weft_fabric_patch *patch, const w
     *room += hit->strength * hit->openness * job->colours->room[hit->material][colour];
 }
 
+/* Whether all of a footprint shows one material: light then varies so slowly that its middle is its mean. */
+INLINE bool is_even(const render_job *job, const weft_fabric_patch *patch, const weft_rig_footprint *at,
+                    int material)
+{
+    weft_rig_hit hit;
+    if (job->sample->has_cloth)
+        return material == job->strip;
+    if (!job->sample->has_plate && !job->sample->n_balls && job->strip < 0 && !job->sample->has_sheet)
+        return true;
+    const float across = fabsf(at->du[0]) + fabsf(at->du[1]) + fabsf(at->dv[0]) + fabsf(at->dv[1]);
+    if (job->sample->has_plate && !(across < job->finest_mm))
+        return false; /* a square could hide between the corners */
+    for (int corner = 0; corner < 4; corner++) {
+        const float du = corner & 1 ? 0.5F : -0.5F, dv = corner & 2 ? 0.5F : -0.5F;
+        weft_rig_trace(&job->tracer, patch, at->x + du * at->du[0] + dv * at->dv[0],
+                       at->y + du * at->du[1] + dv * at->dv[1], &hit);
+        if (hit.material != material)
+            return false;
+    }
+    return !(job->plate_is_raised && material == 0); /* the table may be in a board's shadow */
+}
+
 INLINE void render_pixel(const render_job *job, int u, int v)
 {
-    const int n = job->scene->setup.supersample, colour = weft_cfa_colour(WEFT_CFA_RGGB, u, v);
+    int n = job->scene->setup.supersample;
+    const int colour = weft_cfa_colour(WEFT_CFA_RGGB, u, v);
     const weft_rig_footprint at = weft_rig_footprint_at(job->view, u, v);
     weft_fabric_patch patch = {0};
     if (job->sample->has_cloth)
@@ -210,6 +256,8 @@ INLINE void render_pixel(const render_job *job, int u, int v)
     float sum[LANES] = {0}, room = 0;
     weft_rig_trace(&job->tracer, &patch, at.x, at.y, &hit);
     aim_lamps(&job->lamps, &hit, &rays);
+    if (is_even(job, &patch, &at, hit.material))
+        n = 1;
     float aimed_z = hit.z;
     const float ex = c[0] - hit.x, ey = c[1] - hit.y, ez = c[2] - hit.z;
     const float scale = 1 / sqrtf(ex * ex + ey * ey + ez * ez), eye[3] = {ex * scale, ey * scale, ez * scale};
@@ -241,6 +289,13 @@ WEFT_CLONES static void render_rows(void *context, int band, int begin, int end)
             render_pixel(job, u, v);
 }
 
+static float pattern_mm(const weft_rig_plate *plate)
+{
+    if (plate->pattern == WEFT_RIG_CHECKER)
+        return (float)plate->square_mm;
+    return (float)fmin(plate->chart->patch_mm, plate->chart->pitch_mm - plate->chart->patch_mm);
+}
+
 weft_err weft_rig_frames_init(weft_rig_frames *frames, const weft_rig_scene *scene, const weft_rig_view *view,
                               const weft_rig_sample *sample, weft_error *err)
 {
@@ -261,9 +316,15 @@ weft_err weft_rig_frames_init(weft_rig_frames *frames, const weft_rig_scene *sce
                         .sample = sample,
                         .tracer = weft_rig_tracer_make(sample, view->centre),
                         .colours = colours,
+                        .strip = sample->strip_material ? sample->strip_material : -1,
                         .frames = frames};
     if (sample->has_cloth)
         job->gloss = sample->cloth.weave->gloss;
+    if (sample->has_plate)
+        job->finest_mm = pattern_mm(&sample->plate);
+    if (sample->n_balls) /* glazed */
+        job->gloss =
+            (weft_fabric_gloss){.f0 = 0.05F, .coverage = 1, .alpha_along = 0.1F, .alpha_across = 0.1F};
     fill_colours(job);
     fill_lamps(job);
     weft_parallel_rows(frames->height, render_rows, job);

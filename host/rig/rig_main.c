@@ -13,6 +13,7 @@
 #include "core/progress.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "host/rig/render_set.h"
 #include "host/rig/rig_camera.h"
 #include "host/rig/rig_control.h"
 #include "host/rig/rig_options.h"
@@ -29,11 +30,27 @@
 
 typedef struct rig_args {
     weft_rig_options options;
-    bool quiet, verbose, help, json;
+    const char *render;
+    weft_numbers exposures;
+    bool quiet, verbose, help, json, force;
 } rig_args;
 
 static const weft_field fields[] = {
     WEFT_RIG_OPTION_FIELDS(rig_args, options),
+    {.key = "render",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(rig_args, render),
+     .unit = "DIR",
+     .help = "no scanner: writes a captured set of each --sample (A,B,...) and truth.cal into DIR"},
+    {.key = "exposure",
+     .type = WEFT_FIELD_F64S,
+     .offset = offsetof(rig_args, exposures),
+     .unit = "S,S,...",
+     .help = "of --render: seconds, each frame once with each (default: 75 % of the range)"},
+    {.key = "force",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(rig_args, force),
+     .help = "of --render: replaces sets that are there"},
     {.key = "quiet",
      .short_opt = 'q',
      .type = WEFT_FIELD_FLAG,
@@ -220,6 +237,18 @@ static weft_err read_setup(const weft_rig_options *options, weft_rig_setup *setu
     return WEFT_OK;
 }
 
+static weft_err render(const rig_args *args, weft_error *err)
+{
+    weft_rig_setup setup;
+    const weft_rig_render_plan plan = {args->render, args->options.sample, args->exposures, args->force};
+    for (int i = 0; i < plan.exposures.n; i++)
+        if (!(plan.exposures.values[i] >= 1e-6 && plan.exposures.values[i] <= 60))
+            return weft_fail(err, WEFT_ERR_USAGE, "--exposure %g: wanted 1e-6 to 60 s",
+                             plan.exposures.values[i]);
+    WEFT_TRY(read_setup(&args->options, &setup, err));
+    return weft_rig_render_sets(&setup, &plan, err);
+}
+
 static weft_err make_paths(rig *r, weft_error *err)
 {
     char *absolute = NULL;
@@ -318,9 +347,11 @@ int main(int argc, char **argv)
     weft_log_set_level(args.quiet ? WEFT_LOG_QUIET : args.verbose ? WEFT_LOG_VERBOSE : WEFT_LOG_NORMAL);
     weft_cancel_on_signals();
     (void)signal(SIGPIPE, SIG_IGN);
-    if (status == WEFT_OK)
+    if (status == WEFT_OK && !args.render)
         status = start(&r, &error);
-    if (status == WEFT_OK)
+    if (status == WEFT_OK && args.render)
+        status = render(&args, &error);
+    else if (status == WEFT_OK)
         status = weft_rig_control_run(r.control, obey, alive, &r, &error);
     end(&r);
     if (status != WEFT_OK)

@@ -17,6 +17,7 @@ static const struct {
     {"flat", "50 % grey sheet, matte, flat on the table"},
     {"munsell", "chart of 12 matte Munsell neutrals, flat on the table"},
     {"macbeth", "ColorChecker with the spectra of Ohta 1997, flat on the table"},
+    {"balls", "four glossy dark balls of 24 mm on the table"},
     {"board-table", "checkerboard flat on the table, its middle at the origin, rows along +X"},
 };
 #define N_FLAT ((int)(sizeof flat_samples / sizeof flat_samples[0]))
@@ -247,12 +248,52 @@ static weft_err init_cloth(weft_rig_sample *sample, const weft_rig_scene *scene,
     return WEFT_OK;
 }
 
+static void init_white(weft_rig_sample *sample, const weft_rig_scene *scene)
+{
+    const weft_rig_sheet *const s = &scene->setup.sheet;
+    sample->materials[sample->n_materials++] = weft_spectrum_flat(0.99);
+    for (int k = 0; k < 2; k++)
+        sample->has_sheet |=
+            s->bow_mm[k] != 0 || s->tilt_deg[k] != 0 || s->offset_mm[k] != 0 || s->size_mm[k] != 0;
+    if (!sample->has_sheet)
+        return;
+    sample->sheet = *s;
+    add_table(sample, scene);
+}
+
+static void init_balls(weft_rig_sample *sample, const weft_rig_scene *scene)
+{
+    static const double places[WEFT_RIG_N_BALLS][2] = {{-48, -26}, {44, -29}, {-41, 27}, {50, 24}};
+    add_table(sample, scene);
+    sample->materials[sample->n_materials++] = weft_spectrum_flat(0.02);
+    sample->n_balls = WEFT_RIG_N_BALLS;
+    for (int i = 0; i < WEFT_RIG_N_BALLS; i++)
+        sample->balls[i] = (weft_rig_ball){places[i][0], places[i][1], WEFT_RIG_BALL_RADIUS_MM};
+}
+
+static void add_strip(weft_rig_sample *sample, const weft_rig_setup *setup)
+{
+    if (!(setup->strip_mm[0] < setup->strip_mm[2]))
+        return;
+    memcpy(sample->strip_mm, setup->strip_mm, sizeof sample->strip_mm);
+    sample->strip_material = sample->n_materials++;
+    sample->materials[sample->strip_material] = weft_spectrum_flat(0.99);
+}
+
 static weft_err init_by_name(weft_rig_sample *sample, const weft_rig_scene *scene, const char *name,
                              weft_error *err)
 {
     char board[32];
-    if (strcmp(name, "white") == 0 || strcmp(name, "flat") == 0) {
-        sample->materials[sample->n_materials++] = weft_spectrum_flat(name[0] == 'w' ? 0.99 : 0.5);
+    if (strcmp(name, "white") == 0) {
+        init_white(sample, scene);
+        return WEFT_OK;
+    }
+    if (strcmp(name, "flat") == 0) {
+        sample->materials[sample->n_materials++] = weft_spectrum_flat(0.5);
+        return WEFT_OK;
+    }
+    if (strcmp(name, "balls") == 0) {
+        init_balls(sample, scene);
         return WEFT_OK;
     }
     if (strcmp(name, "munsell") == 0)
@@ -277,7 +318,9 @@ weft_err weft_rig_sample_init(weft_rig_sample *sample, const weft_rig_scene *sce
 {
     *sample = (weft_rig_sample){0};
     snprintf(sample->name, sizeof sample->name, "%s", name);
-    return init_by_name(sample, scene, name, err);
+    WEFT_TRY(init_by_name(sample, scene, name, err));
+    add_strip(sample, &scene->setup);
+    return WEFT_OK;
 }
 
 void weft_rig_sample_fini(weft_rig_sample *sample)

@@ -11,6 +11,10 @@
 #define WEFT_RIG_MAX_MATERIALS 48
 #define WEFT_RIG_N_BOARDS      15
 
+/** Half of what the camera sees of the table, mm: where a bowed sheet touches it. */
+#define WEFT_RIG_HALF_FIELD_X 77.0
+#define WEFT_RIG_HALF_FIELD_Y 51.0
+
 /** Checkerboard: 10 x 7 squares, so 9 x 6 inner corners. */
 #define WEFT_RIG_BOARD_COLUMNS   10
 #define WEFT_RIG_BOARD_ROWS      7
@@ -31,12 +35,26 @@ typedef struct weft_rig_plate {
     const weft_chart *chart; /* WEFT_RIG_CHART only */
 } weft_rig_plate;
 
+/** A glossy dark ball that lies on the table. */
+typedef struct weft_rig_ball {
+    double x, y, radius; /* mm; its middle is `radius` over the table */
+} weft_rig_ball;
+
+#define WEFT_RIG_N_BALLS        4
+#define WEFT_RIG_BALL_RADIUS_MM 12.0
+
 typedef struct weft_rig_sample {
     char name[32];
     int n_materials;
     weft_spectrum materials[WEFT_RIG_MAX_MATERIALS]; /* reflectance of a matte surface */
     double share[WEFT_RIG_MAX_MATERIALS];            /* of the surface; fabrics only (light between yarns) */
     bool has_plate, has_cloth;
+    bool has_sheet;     /* "white" with setup.sheet: material 0 is the sheet, 1 the table */
+    int strip_material; /* of the white strip; 0: there is none */
+    double strip_mm[4]; /* left, bottom, right, top */
+    weft_rig_sheet sheet;
+    int n_balls; /* material 0 is the table, 1 the balls */
+    weft_rig_ball balls[WEFT_RIG_N_BALLS];
     weft_rig_plate plate;
     weft_fabric cloth;
 } weft_rig_sample;

@@ -15,7 +15,8 @@ enum {
     STREAM_LAMP_LOBE,
     STREAM_LAMP_POWER,
     STREAM_LAMP_PUMP,
-    STREAM_CAMERA
+    STREAM_CAMERA,
+    STREAM_DRIFT
 };
 
 double weft_rig_random(uint64_t seed, uint64_t stream, uint64_t index)
@@ -206,6 +207,22 @@ weft_err weft_rig_scene_init(weft_rig_scene *scene, const weft_rig_setup *setup,
     for (int k = 0; k < WEFT_SPECTRUM_SAMPLES; k++)
         scene->room.v[k] = scene->spectra.d65.v[k] / room[1] * setup->room_light / 0.04;
     return WEFT_OK;
+}
+
+uint64_t weft_rig_name_hash(const char *name)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (const char *p = name; *p; p++)
+        hash = (hash ^ (unsigned char)*p) * 0x100000001b3u;
+    return hash;
+}
+
+double weft_rig_drift(const weft_rig_scene *scene, const char *sample, int light)
+{
+    if (!(scene->setup.light_drift > 0) || strcmp(sample, "white") == 0)
+        return 1;
+    const uint64_t index = (weft_rig_name_hash(sample) >> 24 << 8) + (uint64_t)light;
+    return fmax(1 + scene->setup.light_drift * normal(&scene->setup, STREAM_DRIFT, index), 0);
 }
 
 double weft_rig_vignetting(const weft_rig_scene *scene, double u, double v)

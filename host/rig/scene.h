@@ -24,6 +24,14 @@
 #define WEFT_RIG_MAX_WIDTH  4928
 #define WEFT_RIG_MAX_HEIGHT 3264
 
+/** A white sheet that does not lie as it should.  All 0: it fills the table and is flat. */
+typedef struct weft_rig_sheet {
+    double bow_mm[2];    /* how far its middle stands over the edges of the field, across and up */
+    double tilt_deg[2];  /* rises towards +X and +Y */
+    double offset_mm[2]; /* of its middle */
+    double size_mm[2];   /* 0: as large as the table */
+} weft_rig_sheet;
+
 /** What a user may set; the rest follows from the seed. */
 typedef struct weft_rig_setup {
     weft_size size;         /* px; both even (a Bayer cell is 2 x 2) */
@@ -34,6 +42,9 @@ typedef struct weft_rig_setup {
     double aim_jitter_deg;  /* a lamp looks past the middle by at most this */
     double room_light;      /* share of the range that a white sheet shows after 0.04 s with all lamps off */
     bool interreflection;   /* light from yarn to yarn (docs/virtual-scanner.md) */
+    double light_drift;     /* rms by which a lamp's power is off while anything but "white" is there */
+    double strip_mm[4];     /* left, bottom, right, top of the white strip on the table; all 0: none */
+    weft_rig_sheet sheet;   /* how the sheet "white" lies */
     bool has_lights;        /* `lights` replaces what the seed would give */
     struct {
         double position_mm[3];
@@ -83,6 +94,15 @@ weft_err weft_rig_scene_init(weft_rig_scene *scene, const weft_rig_setup *setup,
 
 /** Share of the light that reaches photosite (u, v), 1 at the principal point. */
 double weft_rig_vignetting(const weft_rig_scene *scene, double u, double v);
+
+/**
+ * What `sample` finds of lamp `light`'s power: 1 for the sample "white", 1 + light_drift * a normal number of
+ * the sample's name for others.  LEDs warm up and age between the sheet and the scan.
+ */
+double weft_rig_drift(const weft_rig_scene *scene, const char *sample, int light);
+
+/** FNV-1a of a sample's name: so that its noise and drift do not depend on when it is looked at. */
+uint64_t weft_rig_name_hash(const char *name);
 
 /** A repeatable random number in [0, 1) of a seed, a stream and an index (SplitMix64's finisher). */
 double weft_rig_random(uint64_t seed, uint64_t stream, uint64_t index);

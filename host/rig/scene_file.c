@@ -86,11 +86,44 @@ static weft_err load_lights(const json_t *array, const char *file, weft_rig_setu
     return WEFT_OK;
 }
 
+static weft_err load_sheet(const json_t *object, const char *file, weft_rig_sheet *sheet, weft_error *err)
+{
+    static const char *const known[] = {"bow_mm", "tilt_deg", "offset_mm", "size_mm", NULL};
+    double *const values[] = {sheet->bow_mm, sheet->tilt_deg, sheet->offset_mm, sheet->size_mm};
+    static const double most[] = {20, 30, 500, 2000};
+    char place[512];
+    snprintf(place, sizeof place, "%s: sheet", file);
+    WEFT_TRY(refuse_unknown(object, known, place, err));
+    for (int k = 0; known[k]; k++) {
+        WEFT_TRY(weft_json_get_numbers(object, known[k], WEFT_JSON_OPTIONAL, 2, values[k], place, err));
+        if (!(fabs(values[k][0]) <= most[k] && fabs(values[k][1]) <= most[k]))
+            return weft_fail(err, WEFT_ERR_RANGE, "%s: \"%s\" beyond %g", place, known[k], most[k]);
+    }
+    return WEFT_OK;
+}
+
+/* Where the strip lies and how much the lamps drift: what a scan has beside the sample. */
+static weft_err load_surroundings(const json_t *object, const char *file, weft_rig_setup *setup,
+                                  weft_error *err)
+{
+    const json_t *sheet = NULL;
+    const double *const s = setup->strip_mm;
+    WEFT_TRY(weft_json_get_number(object, "light_drift", WEFT_JSON_OPTIONAL, 0, 0.5, &setup->light_drift,
+                                  file, err));
+    WEFT_TRY(weft_json_get_numbers(object, "strip_mm", WEFT_JSON_OPTIONAL, 4, setup->strip_mm, file, err));
+    if ((s[0] != 0 || s[1] != 0 || s[2] != 0 || s[3] != 0) && !(s[0] < s[2] && s[1] < s[3]))
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "%s: \"strip_mm\" must be left, bottom, right, top of a rectangle", file);
+    WEFT_TRY(weft_json_get_object(object, "sheet", WEFT_JSON_OPTIONAL, &sheet, file, err));
+    return sheet ? load_sheet(sheet, file, &setup->sheet, err) : WEFT_OK;
+}
+
 static weft_err load_scene(const json_t *object, const char *file, weft_rig_setup *setup, weft_error *err)
 {
     static const char *const known[] = {
-        "weft",       "version",         "seed",   "noise", "light_jitter_mm", "aim_jitter_deg",
-        "room_light", "interreflection", "lights", NULL};
+        "weft",       "version",         "seed",   "noise",       "light_jitter_mm", "aim_jitter_deg",
+        "room_light", "interreflection", "lights", "light_drift", "strip_mm",        "sheet",
+        NULL};
     WEFT_TRY(refuse_unknown(object, known, file, err));
     int seed = (int)setup->seed;
     WEFT_TRY(weft_json_get_int(object, "seed", WEFT_JSON_OPTIONAL, 0, 2147483647, &seed, file, err));
@@ -104,6 +137,7 @@ static weft_err load_scene(const json_t *object, const char *file, weft_rig_setu
         weft_json_get_number(object, "room_light", WEFT_JSON_OPTIONAL, 0, 1, &setup->room_light, file, err));
     WEFT_TRY(weft_json_get_bool(object, "interreflection", WEFT_JSON_OPTIONAL, &setup->interreflection, file,
                                 err));
+    WEFT_TRY(load_surroundings(object, file, setup, err));
     const json_t *lights = NULL;
     WEFT_TRY(weft_json_get_array(object, "lights", WEFT_JSON_OPTIONAL, &lights, file, err));
     return lights ? load_lights(lights, file, setup, err) : WEFT_OK;

@@ -101,8 +101,11 @@ const weft_rig_sample *weft_rig_stage_sample(const weft_rig_stage *stage)
 void weft_rig_stage_expose(weft_rig_stage *stage, const double on[WEFT_RIG_N_LIGHTS], double exposure_s,
                            double gain, uint16_t *dn)
 {
+    double power[WEFT_RIG_N_LIGHTS];
     pthread_mutex_lock(&stage->lock);
-    weft_rig_expose(&stage->scene, &stage->frames, on, exposure_s, gain, stage->sequence++, dn);
+    for (int i = 0; i < WEFT_RIG_N_LIGHTS; i++)
+        power[i] = on[i] * weft_rig_drift(&stage->scene, stage->sample->name, i);
+    weft_rig_expose(&stage->scene, &stage->frames, power, exposure_s, gain, stage->sequence++, dn);
     pthread_mutex_unlock(&stage->lock);
 }
 

@@ -31,6 +31,9 @@ void weft_rig_stage_expose(weft_rig_stage *stage, const double on[WEFT_RIG_N_LIG
 /** Exposures since the start. */
 uint64_t weft_rig_stage_frames(weft_rig_stage *stage);
 
+/** Writes the true calibration alone: camera with pose, lamps, the vignetting as light grid. */
+weft_err weft_rig_truth_calibration(const weft_rig_scene *scene, const char *path, weft_error *err);
+
 /**
  * Writes what a perfect scan of the sample would give: FOLDER/truth.cal (camera with pose, lamps with the
  * vignetting as light grid), FOLDER/sensor.maps and FOLDER/plane.maps (docs/virtual-scanner.md).

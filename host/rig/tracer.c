@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#define RAD_PER_DEG 0.017453292519943295
+
 weft_rig_projection weft_rig_project_to_plate(const weft_rig_plate *plate, weft_vec3 centre)
 {
     /* The ray C + s (g - C) meets the plate at s = n.(o - C) / n.(g - C); its plate coordinate along axis a
@@ -85,15 +87,95 @@ static void trace_cloth(const weft_rig_tracer *tracer, const weft_fabric_patch *
     hit->material = point->dye;
 }
 
+/* A sheet that is bent or tilted: the ray is followed up to the height it meets. */
+static void trace_sheet(const weft_rig_tracer *tracer, float gx, float gy, weft_rig_hit *hit)
+{
+    const weft_rig_sheet *const s = &tracer->sample->sheet;
+    const double dx = ((double)tracer->centre[0] - (double)gx) / (double)tracer->centre[2],
+                 dy = ((double)tracer->centre[1] - (double)gy) / (double)tracer->centre[2];
+    const double cx = s->bow_mm[0] / (WEFT_RIG_HALF_FIELD_X * WEFT_RIG_HALF_FIELD_X),
+                 cy = s->bow_mm[1] / (WEFT_RIG_HALF_FIELD_Y * WEFT_RIG_HALF_FIELD_Y);
+    const double tx = tan(RAD_PER_DEG * s->tilt_deg[0]), ty = tan(RAD_PER_DEG * s->tilt_deg[1]);
+    double x = (double)gx, y = (double)gy, z = 0;
+    for (int i = 0; i < 6; i++) { /* each turn leaves a hundredth of the error */
+        z = s->bow_mm[0] + s->bow_mm[1] - cx * x * x - cy * y * y + tx * x + ty * y;
+        x = (double)gx + z * dx;
+        y = (double)gy + z * dy;
+    }
+    hit_table(hit, gx, gy);
+    if ((s->size_mm[0] > 0 && fabs(x - s->offset_mm[0]) > s->size_mm[0] / 2) ||
+        (s->size_mm[1] > 0 && fabs(y - s->offset_mm[1]) > s->size_mm[1] / 2)) {
+        hit->material = 1;
+        return;
+    }
+    const weft_vec3 n = weft_normalise((weft_vec3){2 * cx * x - tx, 2 * cy * y - ty, 1});
+    hit->x = (float)x;
+    hit->y = (float)y;
+    hit->z = (float)z;
+    hit->nx = (float)n.x;
+    hit->ny = (float)n.y;
+    hit->nz = (float)n.z;
+}
+
+static void trace_balls(const weft_rig_tracer *tracer, float gx, float gy, weft_rig_hit *hit)
+{
+    const weft_rig_sample *const sample = tracer->sample;
+    const float *const c = tracer->centre;
+    const weft_vec3 eye = {(double)c[0], (double)c[1], (double)c[2]};
+    const weft_vec3 ray = weft_normalise(weft_sub((weft_vec3){(double)gx, (double)gy, 0}, eye));
+    hit_table(hit, gx, gy);
+    for (int i = 0; i < sample->n_balls; i++) {
+        const weft_rig_ball *const ball = &sample->balls[i];
+        const weft_vec3 middle = {ball->x, ball->y, ball->radius}, to = weft_sub(middle, eye);
+        const double along = weft_dot(to, ray),
+                     under = ball->radius * ball->radius - (weft_dot(to, to) - along * along);
+        if (!(under > 0))
+            continue;
+        const weft_vec3 p = weft_add(eye, weft_scale(ray, along - sqrt(under)));
+        const weft_vec3 n = weft_scale(weft_sub(p, middle), 1 / ball->radius);
+        const weft_vec3 t =
+            weft_normalise(weft_cross(n, fabs(n.z) < 0.9 ? (weft_vec3){0, 0, 1} : (weft_vec3){1, 0, 0}));
+        *hit = (weft_rig_hit){.x = (float)p.x,
+                              .y = (float)p.y,
+                              .z = (float)p.z,
+                              .nx = (float)n.x,
+                              .ny = (float)n.y,
+                              .nz = (float)n.z,
+                              .tx = (float)t.x,
+                              .ty = (float)t.y,
+                              .tz = (float)t.z,
+                              .strength = 1,
+                              .openness = 1,
+                              .material = 1};
+    }
+}
+
+static bool on_strip(const weft_rig_sample *sample, float gx, float gy)
+{
+    const double *const s = sample->strip_mm;
+    const double x = (double)gx, y = (double)gy;
+    return sample->strip_material && x >= s[0] && x <= s[2] && y >= s[1] && y <= s[3];
+}
+
 void weft_rig_trace(const weft_rig_tracer *tracer, const weft_fabric_patch *patch, float gx, float gy,
                     weft_rig_hit *hit)
 {
-    if (tracer->sample->has_cloth)
-        trace_cloth(tracer, patch, gx, gy, hit);
-    else if (tracer->sample->has_plate)
+    const weft_rig_sample *const sample = tracer->sample;
+    const bool strip = on_strip(sample, gx, gy);
+    if (sample->has_plate)
         trace_plate(tracer, gx, gy, hit);
+    else if (sample->n_balls)
+        trace_balls(tracer, gx, gy, hit);
+    else if (strip)
+        hit_table(hit, gx, gy);
+    else if (sample->has_cloth)
+        trace_cloth(tracer, patch, gx, gy, hit);
+    else if (sample->has_sheet)
+        trace_sheet(tracer, gx, gy, hit);
     else
         hit_table(hit, gx, gy);
+    if (strip && hit->z == 0 && !(sample->has_plate && hit->material))
+        hit->material = sample->strip_material;
 }
 
 /* ------------------------------------------------------------------------------------------ views */

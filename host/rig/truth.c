@@ -30,7 +30,7 @@ static weft_err fill_grid(const weft_rig_scene *scene, weft_light_grid *grid, we
     return WEFT_OK;
 }
 
-static weft_err write_calibration(const weft_rig_scene *scene, const char *path, weft_error *err)
+weft_err weft_rig_truth_calibration(const weft_rig_scene *scene, const char *path, weft_error *err)
 {
     weft_calibration cal;
     weft_calibration_init(&cal);
@@ -91,7 +91,7 @@ weft_err weft_rig_truth_write(const weft_rig_stage *stage, const char *folder, d
     if (status == WEFT_OK)
         status = weft_rig_view_plane(&plane, weft_rig_stage_scene(stage), mm_per_px, err);
     if (status == WEFT_OK)
-        status = write_calibration(weft_rig_stage_scene(stage), paths[0], err);
+        status = weft_rig_truth_calibration(weft_rig_stage_scene(stage), paths[0], err);
     if (status == WEFT_OK)
         status = write_maps(stage, weft_rig_stage_view(stage), 0, paths[1], err);
     if (status == WEFT_OK)
