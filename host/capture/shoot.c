@@ -112,6 +112,7 @@ weft_err weft_shoot(weft_shooter *s, uint32_t lights, double exposure_s, double 
                     weft_error *err)
 {
     *shot = (weft_shot){0};
+    WEFT_TRY(weft_camera_prepare(s->camera, err)); /* in the dark: a new helper may take seconds */
     WEFT_TRY(weft_shooter_set_camera(s, exposure_s, gain, err));
     const int most_ms =
         weft_controller_get_info(s->controller)->max_on_ms; /* longer light is asked for again */

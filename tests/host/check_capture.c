@@ -271,7 +271,7 @@ static void test_a_full_set(void **state)
         weft_free(path);
         assert_true(m.width == WIDTH && m.height == HEIGHT && m.cfa == WEFT_CFA_GBRG && m.white == WHITE);
         assert_near(info.exposure_s, 0.04, 1e-6);
-        bench_set = (weft_camera_settings){0.04, 1};
+        bench_set = (weft_camera_settings){.exposure_s = 0.04, .gain = 1};
         for (int p = 0; p < WIDTH * HEIGHT; p++)
             assert_true(abs((int)m.data[p] - sample_at(light_at(on), m.cfa, p % WIDTH, p / WIDTH)) <= 1);
         weft_mosaic_fini(&m);

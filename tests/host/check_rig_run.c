@@ -43,7 +43,8 @@ static void render(const char *name, weft_rig_frames *frames)
 
 static void take(weft_camera_device *camera, double exposure_s, double gain, weft_captured_frame *frame)
 {
-    assert_ok(weft_camera_configure(camera, &(weft_camera_settings){exposure_s, gain}, err));
+    assert_ok(
+        weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = exposure_s, .gain = gain}, err));
     for (int tries = 0; tries < 3; tries++) {
         assert_ok(weft_camera_expose(camera, 5, frame, err));
         if (frame->status == WEFT_FRAME_COMPLETE)

@@ -72,7 +72,7 @@ words() {
 }
 
 no_opencv_in_weft() {
-    ! ldd build/bin/weft | grep -E 'opencv|simavr'
+    ! ldd build/bin/weft | grep -E 'opencv|simavr|aravis|gphoto|libcamera'
 }
 
 scripts() { git ls-files '*.sh' dev .ci/run | xargs shellcheck -S warning; }
@@ -98,7 +98,7 @@ check "file names are unique" unique_names
 check "each header compiles alone" headers_alone
 check "no forbidden calls" forbidden_calls
 check "no left-over marks" words
-check "weft links neither OpenCV nor simavr" no_opencv_in_weft
+check "weft links no OpenCV, simavr or camera library" no_opencv_in_weft
 check "shell scripts (shellcheck)" scripts
 check "static analysis (clang-tidy)" tidy
 ten_longest
