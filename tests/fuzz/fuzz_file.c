@@ -12,6 +12,7 @@
 #include "core/mem.h"
 #include "host/set/import_list.h"
 #include "host/set/set.h"
+#include "shading/material/asset.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -69,6 +70,15 @@ static const char *folder_with(const char *name, const char *path)
     if (symlink(path, link) != 0)
         abort();
     return folder;
+}
+
+static void read_material(const char *path)
+{
+    weft_assets *assets;
+    if (weft_assets_load(path, NULL, &assets, NULL) == WEFT_OK)
+        for (int i = 0; weft_assets_get(assets, i); i++)
+            weft_asset_print(weft_assets_get(assets, i), stdout);
+    weft_assets_destroy(assets);
 }
 
 static void read_set(const char *path)

@@ -77,6 +77,9 @@ static weft_err write_raws(const char *folder, weft_error *err)
 
 static weft_err write_texts(const char *folder, weft_error *err)
 {
+    static const char material[] =
+        ":a := ( clothmaterial :rim_tint_color = #ff8000 // x\n :mask = ( :name = \"m\" ) )\n"
+        ":b := ( a :layers = [ ( a :alpha = 0.5 ) ] :tiling = [1, 2e0] )\n";
     static const char lp[] = "2\na.png 0 0 1\n\"b c.png\" 0,6 0 0.8\n";
     static const char set[] =
         "{\"weft\":\"set\",\"version\":1,\"name\":\"s\",\"created\":\"2026-11-23T10:00:00Z\",\"camera\":{},"
@@ -89,8 +92,10 @@ static weft_err write_texts(const char *folder, weft_error *err)
     const struct {
         const char *reader, *text;
         size_t n;
-    } texts[] = {
-        {"lp", lp, sizeof lp - 1}, {"set", set, sizeof set - 1}, {"calibration", cal, sizeof cal - 1}};
+    } texts[] = {{"lp", lp, sizeof lp - 1},
+                 {"material", material, sizeof material - 1},
+                 {"set", set, sizeof set - 1},
+                 {"calibration", cal, sizeof cal - 1}};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         char path[1024];
         WEFT_TRY(seed_path(folder, texts[i].reader, "small", path, err));
