@@ -1,28 +1,7 @@
 #include "host/rig/controller_sim_private.h"
 
-#include <simavr/avr_eeprom.h>
-
 #include <assert.h>
 #include <string.h>
-
-/* Data addresses of the ATmega328P's registers (DS40002061B, section 30). */
-enum { R_UCSR0A = 0xc0, R_UBRR0L = 0xc4, R_UBRR0H = 0xc5, U2X0 = 0x02 };
-
-bool weft_sim_queue_put(weft_sim_queue *q, uint8_t byte)
-{
-    if (q->head - q->tail == QUEUE_BYTES)
-        return false;
-    q->bytes[q->head++ % QUEUE_BYTES] = byte;
-    return true;
-}
-
-bool weft_sim_queue_take(weft_sim_queue *q, uint8_t *byte)
-{
-    if (q->head == q->tail)
-        return false;
-    *byte = q->bytes[q->tail++ % QUEUE_BYTES];
-    return true;
-}
 
 bool weft_controller_sim_expose(weft_controller_sim *sim, uint32_t exposure_us,
                                 double on_fraction[WEFT_SIM_N_LIGHTS])
@@ -108,32 +87,18 @@ void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high)
     pthread_mutex_unlock(&sim->mutex);
 }
 
-/* The two ioctls work and say that they do not: their value is of no use. */
-void weft_controller_sim_read_eeprom(weft_controller_sim *sim, uint8_t bytes[1024])
+void weft_sim_power_cycle(weft_controller_sim *sim)
 {
-    avr_eeprom_desc_t all = {.ee = bytes, .size = 1024};
-    pthread_mutex_lock(&sim->mutex);
-    avr_ioctl(sim->avr, AVR_IOCTL_EEPROM_GET, &all);
-    pthread_mutex_unlock(&sim->mutex);
-}
-
-void weft_controller_sim_write_eeprom(weft_controller_sim *sim, const uint8_t bytes[1024])
-{
-    uint8_t copy[1024];
-    avr_eeprom_desc_t all = {.ee = copy, .size = 1024};
-    memcpy(copy, bytes, sizeof copy);
-    pthread_mutex_lock(&sim->mutex);
-    avr_ioctl(sim->avr, AVR_IOCTL_EEPROM_SET, &all);
-    pthread_mutex_unlock(&sim->mutex);
+    weft_sim_lose_power(sim);
+    weft_sim_press_reset(sim);
+    avr_regbit_clear(sim->avr, sim->avr->reset_flags.extrf);
+    avr_regbit_set(sim->avr, sim->avr->reset_flags.porf);
 }
 
 void weft_controller_sim_power_cycle(weft_controller_sim *sim)
 {
     pthread_mutex_lock(&sim->mutex);
-    memset(sim->avr->data + sim->avr->ioend + 1, 0x5a, sim->avr->ramend - sim->avr->ioend);
-    weft_sim_press_reset(sim);
-    avr_regbit_clear(sim->avr, sim->avr->reset_flags.extrf);
-    avr_regbit_set(sim->avr, sim->avr->reset_flags.porf);
+    weft_sim_power_cycle(sim);
     pthread_mutex_unlock(&sim->mutex);
 }
 
@@ -185,14 +150,12 @@ double weft_controller_sim_time_s(weft_controller_sim *sim)
 void weft_controller_sim_get_counters(weft_controller_sim *sim, weft_controller_sim_counters *counters)
 {
     pthread_mutex_lock(&sim->mutex);
-    const uint8_t *const r = sim->avr->data;
-    const unsigned divisor = (unsigned)r[R_UBRR0H] << 8 | r[R_UBRR0L];
     *counters = (weft_controller_sim_counters){
         .resets = sim->resets,
         .opened = sim->opened,
         .overruns = sim->overruns,
         .most_lights = sim->most_lights,
-        .bits_per_s = (double)WEFT_SIM_CLOCK_HZ / ((r[R_UCSR0A] & U2X0 ? 8 : 16) * (divisor + 1)),
+        .bits_per_s = weft_sim_baud(sim),
         .simulated_s = (double)sim->avr->cycle / WEFT_SIM_CLOCK_HZ,
         .running = !sim->crashed,
     };
@@ -216,7 +179,7 @@ void weft_controller_sim_send(weft_controller_sim *sim, const uint8_t *bytes, si
     assert(!sim->paced);
     pthread_mutex_lock(&sim->mutex);
     for (size_t i = 0; i < n; i++)
-        weft_sim_queue_put(&sim->in, bytes[i]);
+        weft_sim_line_put(&sim->in, bytes[i], sim->avr->cycle);
     weft_sim_start_feeding(sim);
     pthread_mutex_unlock(&sim->mutex);
 }
@@ -225,7 +188,7 @@ size_t weft_controller_sim_receive(weft_controller_sim *sim, uint8_t *bytes, siz
 {
     size_t n = 0;
     pthread_mutex_lock(&sim->mutex);
-    while (n < room && weft_sim_queue_take(&sim->out, &bytes[n]))
+    while (n < room && weft_sim_line_take(&sim->out, &bytes[n], sim->avr->cycle))
         n++;
     pthread_mutex_unlock(&sim->mutex);
     return n;

@@ -9,10 +9,10 @@
  * - stepped: no thread, no pty; time passes only in weft_controller_sim_run(), thousands of times faster
  *   than a clock when the board sleeps, and the same way every time.  For tests.
  *
- * Where libsimavr differs from the chip, this makes up for it: bytes come one per character time and are
- * lost when the receiver's three places are taken; pins are driven or dark, also right after a reset.
- * A character lasts 11 bit times in the simulator (10 on the wire), and a wrong baud rate is not garbled:
- * weft_controller_sim_get_counters() tells the rate that the firmware has set.
+ * Where libsimavr differs from the chip, this makes up for it: a byte takes ten bit times each way, at the
+ * rate that the registers say in whatever order they were written; it is lost when the receiver's three
+ * places are taken; host and board at different rates hear garbage; pins are driven or dark, also right after
+ * a reset; a byte of the EEPROM takes 3.4 ms; an interrupt that came while it was masked is not forgotten.
  *
  * All functions may be called from any thread, except that a stepped one is for one thread, and that
  * nothing may be called from inside the trigger callback.
@@ -62,7 +62,7 @@ void weft_controller_sim_destroy(weft_controller_sim *sim);
 bool weft_controller_sim_expose(weft_controller_sim *sim, uint32_t exposure_us,
                                 double on_fraction[WEFT_SIM_N_LIGHTS]);
 
-/** Which lights are on now, and since when all have been dark (seconds of simulated time; 0 when lit).
+/** Which lamps give light now, and since when all have been dark (seconds of simulated time; 0 when lit).
  *  A dimmed light counts as on all the time.  dark_for_s may be NULL. */
 uint32_t weft_controller_sim_lights(weft_controller_sim *sim, double *dark_for_s);
 
@@ -71,6 +71,56 @@ void weft_controller_sim_reset(weft_controller_sim *sim);
 
 /** Sends the program into an endless loop, as a mistake in it would; interrupts go on. */
 void weft_controller_sim_hang(weft_controller_sim *sim);
+
+/* -- faults --------------------------------------------------------------------------------------------- */
+
+typedef enum weft_sim_direction { WEFT_SIM_TO_BOARD, WEFT_SIM_FROM_BOARD } weft_sim_direction;
+
+/** What a bad cable does: chances per byte, or per frame (which ends with a zero byte).  All 0: a good one.
+ */
+typedef struct weft_sim_line_faults {
+    double drop, flip, repeat; /* a byte is lost, has a bit wrong, comes twice */
+    double repeat_frame;       /* a whole frame comes twice */
+    double stall;              /* nothing comes for stall_ms, and then all of it */
+    int stall_ms;
+    uint64_t seed; /* the same seed gives the same faults */
+} weft_sim_line_faults;
+
+/** From now on; NULL: a good cable. */
+void weft_controller_sim_set_line_faults(weft_controller_sim *sim, weft_sim_direction direction,
+                                         const weft_sim_line_faults *faults);
+
+/** A lamp that is not as the board wants it: its transistor conducts always, or never; its LED is open, so
+ *  that it draws no current; or its driver takes its time to light it. */
+typedef enum weft_sim_lamp_state {
+    WEFT_SIM_LAMP_GOOD,
+    WEFT_SIM_LAMP_ON,
+    WEFT_SIM_LAMP_OFF,
+    WEFT_SIM_LAMP_OPEN,
+    WEFT_SIM_LAMP_LATE,
+} weft_sim_lamp_state;
+
+/** @param lamp     0 .. WEFT_SIM_N_LIGHTS - 1
+ *  @param late_us  of WEFT_SIM_LAMP_LATE alone */
+void weft_controller_sim_set_lamp(weft_controller_sim *sim, int lamp, weft_sim_lamp_state state,
+                                  uint32_t late_us);
+
+/** Lamps that the board has on: those of weft_controller_sim_lights() and the ones that are broken. */
+uint32_t weft_controller_sim_driven(weft_controller_sim *sim);
+
+/** The serial line is pulled out: the pty hangs up and its name is gone.  The board keeps its power, unless
+ *  `power` says that it came with the cable. */
+void weft_controller_sim_unplug(weft_controller_sim *sim, bool power);
+/** It is plugged in again: a pty under another name, the same board with the same EEPROM.  Unplugs it first
+ *  where that was not done.  @param pty_path  gets the name; room for 128 bytes */
+weft_err weft_controller_sim_plug_in(weft_controller_sim *sim, char *pty_path, weft_error *err);
+
+/** What a UART at read_rate makes of bytes that were sent at sent_rate, back to back.
+ *  @return bytes heard, at most `room` */
+size_t weft_controller_sim_garble(const uint8_t *sent, size_t n, double sent_rate, double read_rate,
+                                  uint8_t *heard, size_t room);
+
+/* -- around the board ----------------------------------------------------------------------------------- */
 
 /** Called from the simulator's thread at each rising edge of the camera trigger pin. */
 void weft_controller_sim_set_trigger(weft_controller_sim *sim, void (*on_trigger)(void *context),
@@ -94,7 +144,8 @@ void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high);
 void weft_controller_sim_read_eeprom(weft_controller_sim *sim, uint8_t bytes[1024]);
 void weft_controller_sim_write_eeprom(weft_controller_sim *sim, const uint8_t bytes[1024]);
 
-/** Power goes and comes back: RAM is lost, the EEPROM stays.  (A reset keeps both.) */
+/** Power goes and comes back: RAM is lost, the EEPROM stays but for a byte that was being stored.  (A reset
+ *  keeps both.) */
 void weft_controller_sim_power_cycle(weft_controller_sim *sim);
 
 /** From now on bit 0 of the flash memory's byte `address` is 0, whatever is written there. */

@@ -38,7 +38,8 @@ static void count_light_until(weft_controller_sim *sim, avr_cycle_count_t cycle)
         return;
     for (int i = 0; i < WEFT_SIM_N_LIGHTS; i++)
         if (sim->lights >> i & 1)
-            sim->on_parts[i] += (cycle - sim->since) * sim->duty;
+            sim->on_parts[i] +=
+                (cycle - sim->since) * (sim->lamps[i].state == WEFT_SIM_LAMP_ON ? FULL_DUTY : sim->duty);
     sim->since = cycle;
 }
 
@@ -55,6 +56,75 @@ static unsigned dimming_duty(const uint8_t *r)
         return 0;
     return r[R_OCR1AL] + 1u;
 }
+
+/* -- broken lamps --------------------------------------------------------------------------------------- */
+
+static avr_cycle_count_t light_up(avr_t *avr, avr_cycle_count_t when, void *context)
+{
+    const weft_sim_lamp_fault *const lamp = context;
+    (void)avr;
+    (void)when;
+    weft_sim_look_at_pins(lamp->sim);
+    return 0;
+}
+
+static bool gives_light(const weft_controller_sim *sim, int i)
+{
+    const weft_sim_lamp_fault *const lamp = &sim->lamps[i];
+    const bool driven = sim->driven >> i & 1;
+    switch (lamp->state) {
+    case WEFT_SIM_LAMP_ON:
+        return true;
+    case WEFT_SIM_LAMP_OFF:
+    case WEFT_SIM_LAMP_OPEN:
+        return false;
+    case WEFT_SIM_LAMP_LATE:
+        return driven && sim->avr->cycle >= lamp->driven_since + lamp->late;
+    default:
+        return driven;
+    }
+}
+
+/* What the lamps make of what the pins want. */
+static uint32_t drive_lamps(weft_controller_sim *sim, uint32_t wanted)
+{
+    const uint32_t rises = wanted & ~sim->driven;
+    uint32_t lights = 0;
+    sim->driven = wanted;
+    for (int i = 0; i < WEFT_SIM_N_LIGHTS; i++) {
+        weft_sim_lamp_fault *const lamp = &sim->lamps[i];
+        if (rises >> i & 1) {
+            lamp->driven_since = sim->avr->cycle;
+            if (lamp->state == WEFT_SIM_LAMP_LATE)
+                avr_cycle_timer_register(sim->avr, lamp->late, light_up, lamp);
+        }
+        lights |= (uint32_t)gives_light(sim, i) << i;
+    }
+    return lights;
+}
+
+void weft_controller_sim_set_lamp(weft_controller_sim *sim, int lamp, weft_sim_lamp_state state,
+                                  uint32_t late_us)
+{
+    pthread_mutex_lock(&sim->mutex);
+    count_light_until(sim, sim->avr->cycle);
+    sim->lamps[lamp] = (weft_sim_lamp_fault){.state = state,
+                                             .late = 1 + (avr_cycle_count_t)late_us * WEFT_SIM_CYCLES_A_US,
+                                             .driven_since = sim->avr->cycle,
+                                             .sim = sim};
+    weft_sim_look_at_pins(sim);
+    pthread_mutex_unlock(&sim->mutex);
+}
+
+uint32_t weft_controller_sim_driven(weft_controller_sim *sim)
+{
+    pthread_mutex_lock(&sim->mutex);
+    const uint32_t driven = sim->driven;
+    pthread_mutex_unlock(&sim->mutex);
+    return driven;
+}
+
+/* -- pins ----------------------------------------------------------------------------------------------- */
 
 void weft_sim_set_exposure_line(weft_controller_sim *sim, bool high)
 {
@@ -78,7 +148,7 @@ void weft_sim_look_at_pins(weft_controller_sim *sim)
     const uint8_t *const r = sim->avr->data;
     const unsigned d = r[R_PORTD] & r[R_DDRD], c = r[R_PORTC] & r[R_DDRC], duty = dimming_duty(r);
     const uint32_t chosen = d >> LIGHTS_D_SHIFT | (c & LIGHTS_C_MASK) << N_LIGHTS_D;
-    const uint32_t lights = duty ? chosen : 0;
+    const uint32_t lights = drive_lamps(sim, duty ? chosen : 0);
     const bool trigger = (r[R_PORTB] & r[R_DDRB] & TRIGGER_B) != 0;
     const bool changes = lights != sim->lights || trigger != sim->trigger_high;
     if (lights != sim->lights || duty != sim->duty) {

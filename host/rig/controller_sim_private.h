@@ -17,15 +17,32 @@
 
 enum {
     FULL_DUTY = 256,
-    RECEIVER_PLACES = 3, /* two in the chip's buffer, one in its shift register */
     QUEUE_BYTES = 1 << 16,
+    WEFT_SIM_FRAME_BYTES = 64, /* longer than any frame */
 };
 
-/* Bytes on their way; write at head, read at tail, both count on for ever. */
-typedef struct weft_sim_queue {
+/* One direction of the serial line: bytes on their way and what happens to them.  Write at head, read at
+ * tail, both count on for ever; none is ready before the one ahead of it. */
+typedef struct weft_sim_line {
     size_t head, tail;
-    uint8_t bytes[QUEUE_BYTES];
-} weft_sim_queue;
+    struct weft_sim_byte {
+        avr_cycle_count_t ready;
+        uint8_t value;
+    } bytes[QUEUE_BYTES];
+    weft_sim_line_faults faults;
+    uint64_t random;
+    avr_cycle_count_t stalled_until;
+    uint8_t frame[WEFT_SIM_FRAME_BYTES]; /* since the last zero byte */
+    size_t n_frame;
+} weft_sim_line;
+
+/* A lamp and what is wrong with it. */
+typedef struct weft_sim_lamp_fault {
+    weft_sim_lamp_state state;
+    avr_cycle_count_t late;         /* light comes so long after current */
+    avr_cycle_count_t driven_since; /* while it is driven */
+    weft_controller_sim *sim;
+} weft_sim_lamp_fault;
 
 /* An exposure under way. */
 typedef struct weft_sim_exposure {
@@ -48,10 +65,12 @@ struct weft_controller_sim {
     uint32_t worn_cell;
 
     /* light */
-    uint32_t lights;              /* on at this cycle */
-    unsigned duty;                /* in FULL_DUTY parts: how much of the time the dimming lets them be */
-    avr_cycle_count_t since;      /* `lights` and `duty` hold since then */
-    avr_cycle_count_t dark_since; /* `lights` is 0 since then */
+    uint32_t driven; /* the board has them on at this cycle */
+    uint32_t lights; /* give light at this cycle: the same but for broken lamps */
+    unsigned duty;   /* in FULL_DUTY parts: how much of the time the dimming lets them be */
+    weft_sim_lamp_fault lamps[WEFT_SIM_N_LIGHTS];
+    avr_cycle_count_t since;              /* `lights` and `duty` hold since then */
+    avr_cycle_count_t dark_since;         /* `lights` is 0 since then */
     uint64_t on_parts[WEFT_SIM_N_LIGHTS]; /* cycles x duty, up to `since` */
     int most_lights;
     weft_sim_exposure *exposures;
@@ -69,23 +88,46 @@ struct weft_controller_sim {
     bool watch_lock;
     avr_cycle_count_t locked_since, longest_lock; /* 0: interrupts are on */
 
-    weft_sim_queue in, out;
+    weft_sim_line in, out;        /* to the board, from it */
+    avr_cycle_count_t sent_until; /* the board's transmitter is busy until then */
     bool feeding;
     unsigned resets, opened, overruns;
+    bool storing; /* the EEPROM is, until the cycle `stored_at` */
+    avr_cycle_count_t stored_at;
 
     /* paced use */
     bool paced, stop;
-    pthread_mutex_t mutex; /* over all of this but `thread`, `master`, `wake` */
+    pthread_mutex_t mutex; /* over all of this but `thread`, `wake` */
     pthread_cond_t passed; /* an exposure has ended, or the simulator */
     pthread_t thread;
-    int master, wake;
+    int master;    /* of the pty; -1: none, or unplugged */
+    int name_kept; /* while unplugged: the old pty, so that the new one gets another name; -1: none */
+    int wake;
     bool is_open;
 };
 
-/** False when it is full. */
-bool weft_sim_queue_put(weft_sim_queue *q, uint8_t byte);
-/** False when it is empty. */
-bool weft_sim_queue_take(weft_sim_queue *q, uint8_t *byte);
+/* -- serial line (controller_sim_line.c) */
+
+/** A byte goes on the line at the cycle `now`, and suffers its faults; lost when 64 KiB wait already. */
+void weft_sim_line_put(weft_sim_line *line, uint8_t byte, avr_cycle_count_t now);
+/** False when none is there yet. */
+bool weft_sim_line_take(weft_sim_line *line, uint8_t *byte, avr_cycle_count_t now);
+/** Forgets what is on its way. */
+void weft_sim_line_clear(weft_sim_line *line);
+/** Connects the UART. */
+void weft_sim_watch_uart(weft_controller_sim *sim);
+/** Hands the bytes of sim->in to the board, one per character time. */
+void weft_sim_start_feeding(weft_controller_sim *sim);
+/** The rate that the firmware has set, bits/s. */
+double weft_sim_baud(const weft_controller_sim *sim);
+
+/* -- where the simulator is not like the chip (controller_sim_chip.c) */
+
+void weft_sim_watch_chip(weft_controller_sim *sim);
+/** The processor was reset: what the simulator forgets then and the chip does not. */
+void weft_sim_mend_chip(weft_controller_sim *sim);
+/** RAM is lost, and the byte that the EEPROM was storing; a reset must follow. */
+void weft_sim_lose_power(weft_controller_sim *sim);
 
 /* -- light (controller_sim_light.c) */
 
@@ -103,9 +145,8 @@ void weft_sim_resume_exposures(weft_controller_sim *sim);
 
 /* -- processor and serial line (controller_sim_board.c) */
 
-/** Hands the bytes of sim->in to the board, one per character time. */
-void weft_sim_start_feeding(weft_controller_sim *sim);
 void weft_sim_press_reset(weft_controller_sim *sim);
+void weft_sim_power_cycle(weft_controller_sim *sim);
 /** Runs to the cycle `until` and not beyond. */
 void weft_sim_run_until(weft_controller_sim *sim, avr_cycle_count_t until);
 

@@ -9,10 +9,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <pthread.h>
-#include <pty.h>
 #include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -438,97 +435,28 @@ static void test_crashed_host_leaves_darkness_at_once(void **state)
 
 /* -- a bad cable ---------------------------------------------------------------------------------------- */
 
-typedef struct cable {
-    int host, board; /* master of the host's pty; the board's pty */
-    double damage;   /* chance per byte */
-    uint64_t seed;
-    atomic_bool stop;
-    int n_damaged;
-    pthread_t thread;
-    char path[128];
-} cable;
-
-static void carry(cable *c, int from, int to)
-{
-    uint8_t in[256], out[512];
-    const ssize_t n = read(from, in, sizeof in);
-    size_t m = 0;
-    for (ssize_t i = 0; i < n; i++) {
-        out[m++] = in[i];
-        if (weft_test_random(&c->seed) >= c->damage)
-            continue;
-        c->n_damaged++;
-        switch ((int)(weft_test_random(&c->seed) * 3)) {
-        case 0:
-            m--; /* lost */
-            break;
-        case 1:
-            out[m - 1] ^= (uint8_t)(1u << (int)(weft_test_random(&c->seed) * 8));
-            break;
-        default:
-            out[m++] = in[i]; /* twice */
-        }
-    }
-    if (m > 0 && write(to, out, m) < 0)
-        c->n_damaged++;
-}
-
-static void *run_cable(void *context)
-{
-    cable *const c = context;
-    while (!atomic_load(&c->stop)) {
-        struct pollfd p[] = {{.fd = c->host, .events = POLLIN}, {.fd = c->board, .events = POLLIN}};
-        poll(p, 2, 20);
-        if (p[0].revents & POLLIN)
-            carry(c, c->host, c->board);
-        if (p[1].revents & POLLIN)
-            carry(c, c->board, c->host);
-    }
-    return NULL;
-}
-
-static int plug_in(cable *c)
-{
-    int slave;
-    struct termios raw;
-    memset(&raw, 0, sizeof raw);
-    cfmakeraw(&raw);
-    assert_int_equal(openpty(&c->host, &slave, NULL, &raw, NULL), 0);
-    assert_int_equal(ptsname_r(c->host, c->path, sizeof c->path), 0);
-    c->board = open(pty_path, O_RDWR | O_NOCTTY | O_NONBLOCK);
-    assert_true(c->board >= 0);
-    assert_int_equal(pthread_create(&c->thread, NULL, run_cable, c), 0);
-    return slave; /* held open, or the master hangs up between hosts */
-}
-
 static void test_a_bad_cable_costs_retries_and_nothing_else(void **state)
 {
     (void)state;
-    cable c = {.seed = 7};
-    weft_controller *controller = NULL;
+    static const weft_sim_line_faults bad = {.drop = 0.0015, .flip = 0.0015, .repeat = 0.0015, .seed = 7};
+    weft_controller *const controller = open_it(5000);
     weft_controller_status s;
-    const int slave = plug_in(&c);
-    assert_ok(weft_controller_open(c.path, 5000, &controller, err));
-    c.damage = 0.004; /* every tenth exchange */
-    double wrong = 0;
+    weft_controller_sim_set_line_faults(sim, WEFT_SIM_TO_BOARD, &bad);
+    weft_controller_sim_set_line_faults(sim, WEFT_SIM_FROM_BOARD, &bad);
+    int wrong = 0;
     for (int i = 0; i < 150; i++) {
         const uint32_t wanted = 1u << i % 10;
         assert_ok(weft_controller_light(controller, wanted, 256, 2000, NULL, err));
         wrong += weft_controller_sim_lights(sim, NULL) != wanted;
     }
-    c.damage = 0;
+    weft_controller_sim_set_line_faults(sim, WEFT_SIM_TO_BOARD, NULL);
+    weft_controller_sim_set_line_faults(sim, WEFT_SIM_FROM_BOARD, NULL);
     assert_ok(weft_controller_get_status(controller, &s, err));
-    print_message("%d bytes damaged, %u retries, %u bad frames at the board, %u here\n", c.n_damaged,
-                  s.retries, s.crc_errors, s.bad_replies);
-    assert_int_equal((int)wrong, 0);
-    assert_true(c.n_damaged > 5 && s.retries > 3);
-    assert_true(s.crc_errors + s.bad_replies > 2);
+    print_message("%u retries, %u bad frames at the board, %u here\n", s.retries, s.crc_errors,
+                  s.bad_replies);
+    assert_int_equal(wrong, 0);
+    assert_true(s.retries > 3 && s.crc_errors + s.bad_replies > 2);
     weft_controller_close(controller);
-    atomic_store(&c.stop, true);
-    pthread_join(c.thread, NULL);
-    close(slave);
-    close(c.host);
-    close(c.board);
 }
 
 /* -- ports ---------------------------------------------------------------------------------------------- */
