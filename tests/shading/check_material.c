@@ -3,6 +3,7 @@
 
 #include "core/file.h"
 #include "core/mem.h"
+#include "shading/bake/baked.h"
 #include "shading/material/asset.h"
 
 #include <dirent.h>
@@ -335,6 +336,23 @@ static void check_library(void **state)
     assert_true(n_files >= 9 && n_materials > 0);
 }
 
+/* The container of baked maps: defaults by type, one size for all maps, names. */
+static void check_baked_container(void **state)
+{
+    (void)state;
+    weft_baked baked;
+    assert_ok(weft_baked_init(&baked, "velvet", weft_material_type_find("clothmaterial"), err));
+    assert_true(baked.maps[WEFT_BAKED_CLOTH].constant[0] == 1 &&
+                baked.maps[WEFT_BAKED_NORMAL].constant[2] == 1);
+    assert_ok(weft_baked_add(&baked, WEFT_BAKED_ALBEDO, 8, 4, err));
+    assert_fails(weft_baked_add(&baked, WEFT_BAKED_HEIGHT, 8, 8, err), WEFT_ERR_MISMATCH, "height is 8 x 8");
+    assert_int_equal(weft_baked_levels(8, 4), 4);
+    assert_int_equal(weft_baked_levels(32768, 1), WEFT_BAKED_MAX_MIPS);
+    for (int kind = 0; kind < WEFT_BAKED_COUNT; kind++)
+        assert_int_equal(weft_baked_find(weft_baked_rows[kind].name), kind);
+    weft_baked_fini(&baked);
+}
+
 /* Damaged texts: an answer or an error, never a crash (the sanitizers watch). */
 static void check_damaged_texts(void **state)
 {
@@ -384,6 +402,7 @@ int main(void)
         cmocka_unit_test(check_files_that_are_no_text),
         cmocka_unit_test(check_formatter),
         cmocka_unit_test(check_library),
+        cmocka_unit_test(check_baked_container),
         cmocka_unit_test(check_damaged_texts),
         cmocka_unit_test(check_memory_runs_out),
     };
