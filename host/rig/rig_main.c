@@ -13,6 +13,7 @@
 #include "core/progress.h"
 #include "core/text.h"
 #include "core/version.h"
+#include "host/rig/dslr.h"
 #include "host/rig/render_set.h"
 #include "host/rig/rig_camera.h"
 #include "host/rig/rig_control.h"
@@ -81,6 +82,7 @@ typedef struct rig {
     weft_rig_stage *stage;
     weft_controller_sim *sim;
     weft_rig_camera *camera;
+    weft_dslr *dslr;
     weft_rig_control *control;
 } rig;
 
@@ -155,15 +157,16 @@ static json_t *obey(void *context, const char *line, bool *quit)
     const struct {
         const char *name;
         bool wants_more;
-    } commands[] = {{"sample", true}, {"truth", true},  {"samples", false},
-                    {"state", false}, {"reset", false}, {"quit", false}};
+    } commands[] = {{"sample", true}, {"truth", true}, {"samples", false}, {"state", false},
+                    {"reset", false}, {"quit", false}, {"dslr", true}};
     int which = -1;
     for (int i = 0; i < (int)(sizeof commands / sizeof commands[0]); i++)
         if (strlen(commands[i].name) == word && strncmp(line, commands[i].name, word) == 0)
             which = i;
     if (which < 0 || commands[which].wants_more != (rest[0] != '\0'))
-        return json_pack("{s:b, s:s}", "ok", 0, "error",
-                         "wanted: sample NAME, samples, state, truth DIR [MM_PER_PX], reset or quit");
+        return json_pack(
+            "{s:b, s:s}", "ok", 0, "error",
+            "wanted: sample NAME, samples, state, truth DIR [MM_PER_PX], dslr WORDS, reset or quit");
     switch (which) {
     case 0:
         return obey_sample(r, rest);
@@ -176,6 +179,8 @@ static json_t *obey(void *context, const char *line, bool *quit)
     case 4:
         weft_controller_sim_reset(r->sim);
         return json_pack("{s:b}", "ok", 1);
+    case 6:
+        return weft_dslr_obey(r->dslr, rest);
     default:
         *quit = true;
         return json_pack("{s:b}", "ok", 1);
@@ -264,14 +269,15 @@ static weft_err make_paths(rig *r, weft_error *err)
 
 static weft_err announce(const rig *r, weft_error *err)
 {
-    char camera[80];
+    char camera[80], dslr[112];
     const weft_rig_scene *const scene = weft_rig_stage_scene(r->stage);
     snprintf(camera, sizeof camera, "aravis:%s", r->args->options.address);
-    json_t *const json = json_pack("{s:s, s:i, s:s, s:s, s:s, s:i, s:[i,i], s:I, s:s, s:s}", "weft", "rig",
-                                   "version", RIG_VERSION, "pty", r->pty, "camera", camera, "control",
-                                   r->socket_path, "pid", (int)getpid(), "size", scene->camera.width,
-                                   scene->camera.height, "seed", (json_int_t)scene->setup.seed, "firmware",
-                                   r->firmware, "program", "weft-rig " WEFT_VERSION);
+    snprintf(dslr, sizeof dslr, "gphoto:ptpip:%s:%d", r->args->options.address, weft_dslr_port(r->dslr));
+    json_t *const json = json_pack(
+        "{s:s, s:i, s:s, s:s, s:[s,s], s:s, s:i, s:[i,i], s:I, s:s, s:s}", "weft", "rig", "version",
+        RIG_VERSION, "pty", r->pty, "camera", camera, "cameras", camera, dslr, "control", r->socket_path,
+        "pid", (int)getpid(), "size", scene->camera.width, scene->camera.height, "seed",
+        (json_int_t)scene->setup.seed, "firmware", r->firmware, "program", "weft-rig " WEFT_VERSION);
     if (!json)
         return weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
     const weft_err status = weft_json_save(r->json_path, json, err);
@@ -300,6 +306,7 @@ static weft_err start(rig *r, weft_error *err)
     };
     WEFT_TRY(weft_controller_sim_create_with(&program, &r->sim, r->pty, err));
     WEFT_TRY(weft_rig_camera_create(options->address, options->dir, r->stage, r->sim, &r->camera, err));
+    WEFT_TRY(weft_dslr_create(options->address, r->stage, r->sim, &r->dslr, err));
     return announce(r, err);
 }
 
@@ -307,6 +314,7 @@ static void end(rig *r)
 {
     if (r->control && r->json_path)
         (void)remove(r->json_path);
+    weft_dslr_destroy(r->dslr);
     weft_rig_camera_destroy(r->camera);
     weft_controller_sim_destroy(r->sim);
     weft_rig_stage_destroy(r->stage);
