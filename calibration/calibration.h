@@ -6,6 +6,8 @@
 #ifndef WEFT_CALIBRATION_CALIBRATION_H
 #define WEFT_CALIBRATION_CALIBRATION_H
 
+#include "calibration/colour_model.h"
+#include "calibration/gamut.h"
 #include "core/error.h"
 #include "core/image.h"
 #include "core/linalg.h"
@@ -13,7 +15,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 
-#define WEFT_CALIBRATION_VERSION 1
+#define WEFT_CALIBRATION_VERSION 2   /* written when the file says something that version 1 does not know */
 #define WEFT_LIGHTS_MAX          128 /* the largest open benchmark sets have 100 */
 
 /** Pinhole camera with OpenCV's distortion, and its pose over the sample plane. */
@@ -51,10 +53,12 @@ typedef struct weft_linearity {
     double max_deviation;
 } weft_linearity;
 
-typedef struct weft_colour_matrix {
-    weft_mat3 to_linear_srgb;                                /* from camera RGB after white balance */
+typedef struct weft_colour_part {
+    weft_colour_model model;                                 /* from camera RGB after white balance */
     double delta_e_mean, delta_e_max, delta_e_held_out_mean; /* CIEDE2000 over the chart */
-} weft_colour_matrix;
+    int n_gamut;                                             /* 0: unknown */
+    double gamut[WEFT_GAMUT_MAX_POINTS][3];                  /* linear sRGB of the patches it was fitted to */
+} weft_colour_part;
 
 typedef struct weft_calibration {
     char created[32];
@@ -64,7 +68,7 @@ typedef struct weft_calibration {
     int n_lights;
     weft_light lights[WEFT_LIGHTS_MAX];
     weft_light_grid grid;
-    weft_colour_matrix colour;
+    weft_colour_part colour;
     json_t *other; /* keys of the file this program does not know, and reports; written back; may be NULL */
 } weft_calibration;
 

@@ -1,5 +1,6 @@
 #include "calibration/calibration_json.h"
 
+#include "calibration/calibration_colour.h"
 #include "core/json.h"
 
 #include <stdio.h>
@@ -165,27 +166,6 @@ static weft_err get_grid(const json_t *object, weft_calibration *cal, const char
     return WEFT_OK;
 }
 
-static weft_err get_colour(const json_t *object, weft_colour_matrix *colour, const char *file,
-                           weft_error *err)
-{
-    char place[1024];
-    snprintf(place, sizeof place, "%s: colour", file);
-    WEFT_TRY(weft_json_get_numbers(object, "to_linear_srgb", WEFT_JSON_REQUIRED, 9, colour->to_linear_srgb.m,
-                                   place, err));
-    weft_mat3 inverse;
-    if (!weft_mat3_invert(&colour->to_linear_srgb, &inverse))
-        return weft_fail(err, WEFT_ERR_RANGE, "%s: \"to_linear_srgb\" is singular", place);
-    const weft_json_need maybe = WEFT_JSON_OPTIONAL;
-    const json_t *delta_e;
-    WEFT_TRY(weft_json_get_object(object, "delta_e_2000", maybe, &delta_e, place, err));
-    if (!delta_e)
-        return WEFT_OK;
-    WEFT_TRY(weft_json_get_number(delta_e, "mean", maybe, 0, 1e3, &colour->delta_e_mean, place, err));
-    WEFT_TRY(weft_json_get_number(delta_e, "max", maybe, 0, 1e3, &colour->delta_e_max, place, err));
-    return weft_json_get_number(delta_e, "held_out_mean", maybe, 0, 1e3, &colour->delta_e_held_out_mean,
-                                place, err);
-}
-
 static bool is_known(const char *key)
 {
     for (const char *const *k = known_keys; *k; k++)
@@ -236,7 +216,7 @@ weft_err weft_calibration_from_json(const json_t *root, const char *place, weft_
     if (grid)
         WEFT_TRY(get_grid(grid, cal, grid_file, place, err));
     if (colour)
-        WEFT_TRY(get_colour(colour, &cal->colour, place, err));
+        WEFT_TRY(weft_calibration_colour_from_json(colour, &cal->colour, place, err));
     cal->has_colour = colour;
     return get_other(root, cal, place, err);
 }
@@ -278,17 +258,12 @@ static json_t *lights_json(const weft_calibration *cal)
     return array;
 }
 
-static json_t *colour_json(const weft_colour_matrix *c)
-{
-    return json_pack("{s:o, s:{s:f, s:f, s:f}}", "to_linear_srgb", weft_json_numbers(c->to_linear_srgb.m, 9),
-                     "delta_e_2000", "mean", c->delta_e_mean, "max", c->delta_e_max, "held_out_mean",
-                     c->delta_e_held_out_mean);
-}
-
 json_t *weft_calibration_to_json(const weft_calibration *cal, const char *created, const char *grid_file)
 {
-    json_t *const root = json_pack("{s:s, s:i, s:s}", "weft", "calibration", "version",
-                                   WEFT_CALIBRATION_VERSION, "created", created);
+    /* The lowest version that says it all: programs that know no more can still read it. */
+    const int version = cal->has_colour ? weft_calibration_colour_version(&cal->colour) : 1;
+    json_t *const root =
+        json_pack("{s:s, s:i, s:s}", "weft", "calibration", "version", version, "created", created);
     if (!root)
         return NULL;
     if (cal->has_camera)
@@ -304,7 +279,7 @@ json_t *weft_calibration_to_json(const weft_calibration *cal, const char *create
                             json_pack("{s:s, s:i, s:i}", "file", grid_file, "columns", cal->grid.columns,
                                       "rows", cal->grid.rows));
     if (cal->has_colour)
-        json_object_set_new(root, "colour", colour_json(&cal->colour));
+        json_object_set_new(root, "colour", weft_calibration_colour_to_json(&cal->colour));
     if (cal->other)
         json_object_update_missing(root, cal->other);
     return root;

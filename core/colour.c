@@ -64,6 +64,14 @@ void weft_xyz_to_xyy(const double xyz[3], double xyy[3])
     xyy[2] = sum > 0 ? xyz[1] : 0;
 }
 
+void weft_xyy_to_xyz(const double xyy[3], double xyz[3])
+{
+    const double x = xyy[0], y = fmax(xyy[1], 1e-6), luminance = xyy[2];
+    xyz[0] = luminance * x / y;
+    xyz[1] = luminance;
+    xyz[2] = luminance * (1 - x - y) / y;
+}
+
 void weft_xyz_to_srgb(const double xyz[3], double rgb[3])
 {
     apply_inverse(&srgb_to_xyz, xyz, rgb);

@@ -24,6 +24,8 @@ void weft_xyz_to_srgb(const double xyz[3], double rgb[3]);
 /** Chromaticity x, y and luminance Y of XYZ; black, which has none, gets that of D65: 0.3127, 0.3290
  *  (S-FC3-02). */
 void weft_xyz_to_xyy(const double xyz[3], double xyy[3]);
+/** Back; a y below 1e-6, which no light has, counts as 1e-6. */
+void weft_xyy_to_xyz(const double xyy[3], double xyz[3]);
 
 /** CIE 1976 L*a*b* against `white`. */
 void weft_xyz_to_lab(const double xyz[3], const double white[3], double lab[3]);

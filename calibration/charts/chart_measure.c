@@ -5,6 +5,7 @@
 #include "core/mem.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { SITES_MIN = 16 };
 static const double window = 0.5; /* of the patch's side */
@@ -45,14 +46,18 @@ static weft_site site_of(weft_cfa cfa, int u, int v)
     return weft_cfa_colour(cfa, u + 1, v) == 0 ? WEFT_SITE_G1 : WEFT_SITE_G2;
 }
 
+/* The window in blocks: what a stain covers differs from the rest. */
+enum { BLOCKS = 4, N_BLOCKS = BLOCKS * BLOCKS };
+
 /* Values of the window by class; the classes share one buffer of `room` each. */
 typedef struct collector {
     double *values[WEFT_SITES];
+    uint8_t *blocks[WEFT_SITES]; /* in which each value lies */
     int n[WEFT_SITES];
     int clipped, total;
 } collector;
 
-static void collect_pixel(const weft_chart_picture *picture, int u, int v, collector *c)
+static void collect_pixel(const weft_chart_picture *picture, int u, int v, int block, collector *c)
 {
     const weft_image *const image = picture->image;
     c->total++;
@@ -64,9 +69,18 @@ static void collect_pixel(const weft_chart_picture *picture, int u, int v, colle
         if (picture->cfa != WEFT_CFA_NONE && site_of(picture->cfa, u, v) != (weft_site)s)
             continue;
         const float value = weft_image_row(image, image->planes == 3 ? weft_site_colour[s] : 0, v)[u];
-        if (isfinite(value))
-            c->values[s][c->n[s]++] = (double)value;
+        if (!isfinite(value))
+            continue;
+        c->blocks[s][c->n[s]] = (uint8_t)block;
+        c->values[s][c->n[s]++] = (double)value;
     }
+}
+
+/* Which quarter of the window, 0..BLOCKS - 1; `at` is -half..half. */
+static int block_of(double at, double half)
+{
+    const int k = (int)((at + half) / (2 * half) * BLOCKS);
+    return k < 0 ? 0 : k >= BLOCKS ? BLOCKS - 1 : k;
 }
 
 static void collect(const weft_chart_picture *picture, const weft_mat3 *to_chart, double x, double y,
@@ -80,15 +94,68 @@ static void collect(const weft_chart_picture *picture, const weft_mat3 *to_chart
             double px, py;
             if (weft_homography_apply(to_chart, u, v, &px, &py) && fabs(px - x) <= half &&
                 fabs(py - y) <= half)
-                collect_pixel(picture, u, v, c);
+                collect_pixel(picture, u, v, BLOCKS * block_of(py - y, half) + block_of(px - x, half), c);
         }
 }
 
+/* Sums over the blocks of one class; those of half the usual number of values or less are left out. */
+typedef struct block_means {
+    double mean[N_BLOCKS], n[N_BLOCKS];
+} block_means;
+
+static void average_blocks(const double *values, const uint8_t *blocks, int n, const weft_robust_mean *m,
+                           block_means *b)
+{
+    *b = (block_means){0};
+    for (int i = 0; i < n; i++)
+        if (fabs(values[i] - m->mean) <= 4 * m->std_dev) {
+            b->mean[blocks[i]] += values[i];
+            b->n[blocks[i]]++;
+        }
+    for (int k = 0; k < N_BLOCKS; k++) {
+        const bool enough = b->n[k] > 0 && 2 * N_BLOCKS * b->n[k] > n;
+        b->mean[k] = enough ? b->mean[k] / b->n[k] : (double)NAN;
+    }
+}
+
+/* Rms of the block means off a plane (the light has a gradient), less what noise alone would give. */
+static double unevenness_of(const block_means *b, const weft_robust_mean *m)
+{
+    double sx = 0, sy = 0, s0 = 0, xx = 0, noise = 0, square = 0;
+    int n = 0;
+    for (int k = 0; k < N_BLOCKS; k++) {
+        if (isnan(b->mean[k]))
+            continue;
+        const double x = k % BLOCKS - 1.5, y = k / BLOCKS - 1.5, d = b->mean[k] - m->mean;
+        s0 += d;
+        sx += x * d;
+        sy += y * d;
+        xx += x * x;
+        noise += m->std_dev * m->std_dev / b->n[k];
+        n++;
+    }
+    if (n < N_BLOCKS || !(m->mean > 0)) /* too small a patch to say */
+        return 0;
+    for (int k = 0; k < N_BLOCKS; k++) {
+        const double x = k % BLOCKS - 1.5, y = k / BLOCKS - 1.5;
+        const double d = b->mean[k] - m->mean - s0 / n - (sx * x + sy * y) / xx;
+        square += d * d;
+    }
+    return sqrt(fmax(square / (n - 3) - 2 * noise / n, 0)) / m->mean; /* twice: its own scatter */
+}
+
+/* @param scratch  room for twice the values of a class */
 static void summarise(collector *c, double *scratch, weft_patch_reading *reading)
 {
     int kept = 0, all = 0;
+    reading->unevenness = 0;
     for (int s = 0; s < WEFT_SITES; s++) {
-        const weft_robust_mean m = weft_mean_robust(c->values[s], c->n[s], scratch);
+        double *const copy = scratch + c->n[s]; /* the order of the values tells their places */
+        memcpy(copy, c->values[s], (size_t)c->n[s] * sizeof *copy);
+        const weft_robust_mean m = weft_mean_robust(copy, c->n[s], scratch);
+        block_means b;
+        average_blocks(c->values[s], c->blocks[s], c->n[s], &m, &b);
+        reading->unevenness = fmax(reading->unevenness, unevenness_of(&b, &m));
         reading->mean[s] = m.mean;
         reading->std_dev[s] = m.std_dev;
         reading->n[s] = m.kept;
@@ -112,12 +179,17 @@ static weft_err measure_patch(const weft_chart *chart, const weft_chart_picture 
         return weft_fail(err, WEFT_ERR_NODATA, "patch \"%s\" lies outside the picture: move the chart",
                          chart->patches[patch].name);
     const size_t room = (size_t)(b.u1 - b.u0 + 1) * (size_t)(b.v1 - b.v0 + 1);
-    double *const buffer = weft_alloc(room * (WEFT_SITES + 1), sizeof *buffer, err);
-    if (!buffer)
+    double *const buffer = weft_alloc(room * (WEFT_SITES + 2), sizeof *buffer, err);
+    uint8_t *const blocks = buffer ? weft_alloc(room * WEFT_SITES, 1, err) : NULL;
+    if (!blocks) {
+        weft_free(buffer);
         return WEFT_ERR_NOMEM;
+    }
     collector c;
-    for (int s = 0; s < WEFT_SITES; s++)
+    for (int s = 0; s < WEFT_SITES; s++) {
         c.values[s] = buffer + room * (size_t)s;
+        c.blocks[s] = blocks + room * (size_t)s;
+    }
     collect(picture, to_chart, x, y, half, &b, &c);
     weft_err status = WEFT_OK;
     const int wanted = (picture->cfa == WEFT_CFA_NONE ? 1 : 4) * SITES_MIN;
@@ -130,6 +202,7 @@ static weft_err measure_patch(const weft_chart *chart, const weft_chart_picture 
     else
         summarise(&c, buffer + room * WEFT_SITES, reading);
     weft_free(buffer);
+    weft_free(blocks);
     return status;
 }
 

@@ -10,13 +10,18 @@
 const char *const weft_patch_clipped = "clipped under more than half of the lights";
 const char *const weft_patch_unsteady = "the lights disagree by more than 5 %";
 const char *const weft_patch_dark = "too dark";
+const char *const weft_patch_stained = "dust or a stain: it is not of one colour";
+const char *const weft_patch_by_hand = "by hand";
 
 static const double unsteady = 0.05;
-static const double apart = 0.03; /* a light within this of the median is never left out */
+static const double uneven = 0.03;       /* S-FC3-03 allows 5 % with the noise */
+static const double stained_share = 0.1; /* of photosites that are of another colour */
+static const double apart = 0.03;        /* a light within this of the median is never left out */
 
 /* Reflectance of one patch as each light shows it. */
 typedef struct views {
     int n;
+    int stained; /* views in which the patch is not one colour */
     double rgb[WEFT_LIGHTS_MAX][3];
 } views;
 
@@ -28,6 +33,7 @@ static views look(const weft_patch_light *lights, int n_lights, int patch)
         const double *const e = lights[l].irradiance[patch];
         if (r->clipped > 0)
             continue;
+        v.stained += r->unevenness > uneven || r->outliers > stained_share;
         v.rgb[v.n][0] = r->mean[WEFT_SITE_R] / e[0];
         v.rgb[v.n][1] = 0.5 * (r->mean[WEFT_SITE_G1] + r->mean[WEFT_SITE_G2]) / e[1];
         v.rgb[v.n][2] = r->mean[WEFT_SITE_B] / e[2];
@@ -85,6 +91,7 @@ void weft_patch_colours(const weft_chart *chart, const weft_patch_light *lights,
             colours[p].excluded = weft_patch_clipped;
             continue;
         }
+        const bool stained = 2 * v.stained > v.n;
         drop_strays(&v);
         colours[p].n_lights = v.n;
         if (v.n == 0) {
@@ -95,6 +102,8 @@ void weft_patch_colours(const weft_chart *chart, const weft_patch_light *lights,
         const double *const rgb = colours[p].camera;
         if (!(rgb[0] > 0 && rgb[1] > 0 && rgb[2] > 0))
             colours[p].excluded = weft_patch_dark;
+        else if (stained)
+            colours[p].excluded = weft_patch_stained;
         else if (colours[p].spread > unsteady || 2 * v.n < n_lights)
             colours[p].excluded = weft_patch_unsteady;
     }

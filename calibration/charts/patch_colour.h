@@ -21,6 +21,8 @@ typedef struct weft_patch_colour {
 extern const char *const weft_patch_clipped;  /* more than half of the lights clip in it */
 extern const char *const weft_patch_unsteady; /* the lights disagree by more than 5 % */
 extern const char *const weft_patch_dark;     /* nothing is seen */
+extern const char *const weft_patch_stained;  /* dust, a scratch, a stain: not one colour */
+extern const char *const weft_patch_by_hand;  /* the user said so */
 
 /**
  * Divides every reading by its light and averages over the lights, leaving out clipped ones and those that

@@ -1,18 +1,23 @@
 #include "host/cli/chart_session.h"
 #include "host/cli/command.h"
 
+#include "calibration/calibration_colour.h"
 #include "calibration/calibration_report.h"
 #include "calibration/charts/chart_light.h"
 #include "calibration/charts/patch_colour.h"
 #include "core/json.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "core/text.h"
 
 #include <string.h>
+#include <strings.h>
 
 typedef struct colour_args {
     weft_chart_options chart;
     const char *name, *edition;
+    int method;
+    weft_texts exclude;
 } colour_args;
 
 static const weft_field fields[] = {
@@ -28,6 +33,17 @@ static const weft_field fields[] = {
      .unit = "NAME",
      .def = "ohta1997",
      .help = "whose reference colours: ohta1997, before2014, after2014 (when your chart was made)"},
+    {.key = "method",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(colour_args, method),
+     .choices = "matrix|root-polynomial|sequence",
+     .def = "matrix",
+     .help = "3x3; root-polynomial of degree 2; or affine, cubic, affine in xyY"},
+    {.key = "exclude",
+     .type = WEFT_FIELD_TEXTS,
+     .offset = offsetof(colour_args, exclude),
+     .unit = "PATCH",
+     .help = "leave a patch out, by name or number from 1; may be given several times"},
     WEFT_CHART_FIELDS(colour_args, chart),
     {0},
 };
@@ -71,12 +87,14 @@ static json_t *report(const weft_chart_session *session, const weft_chart_option
             json_object_set_new(one, "excluded", json_string(c->excluded));
         json_array_append_new(patches, one);
     }
+    json_object_set_new(r, "method", json_string(weft_colour_method_name(fit->model.method)));
     json_object_update_new(r, json_pack("{s:i, s:i, s:f, s:f, s:f, s:f, s:f, s:f, s:f, s:o}", "patches_used",
                                         fit->n_used, "rank", fit->rank, "condition", fit->condition,
                                         "before_mean", fit->before_mean, "before_max", fit->before_max,
                                         "trained_mean", fit->trained_mean, "trained_max", fit->trained_max,
                                         "held_out_mean", fit->held_out_mean, "held_out_max",
                                         fit->held_out_max, "patches", patches));
+    json_object_set_new(r, "terms", json_integer(fit->n_terms));
     return r;
 }
 
@@ -85,12 +103,13 @@ static weft_err print(const weft_invocation *inv, const weft_chart_session *sess
 {
     if (inv->json) {
         json_t *const r = json_deep_copy(weft_calibration_get_report(&session->cal, "colour"));
-        json_object_set_new(r, "to_linear_srgb", weft_json_numbers(fit->to_linear_srgb.m, 9));
+        json_object_set_new(r, "colour", weft_calibration_colour_to_json(&session->cal.colour));
         return weft_print_json(inv, r, err);
     }
     const int n = session->chart->columns * session->chart->rows;
-    fprintf(inv->out, "%s %s: %d of %d patches, condition %.1f\n", session->chart->name,
-            session->chart->edition, fit->n_used, n, fit->condition);
+    fprintf(inv->out, "%s %s: %d of %d patches, %s, condition %.1f\n", session->chart->name,
+            session->chart->edition, fit->n_used, n, weft_colour_method_name(fit->model.method),
+            fit->condition);
     for (int p = 0; p < n; p++)
         if (colours[p].excluded)
             fprintf(inv->out, "left out: %s (%s)\n", session->chart->patches[p].name, colours[p].excluded);
@@ -102,12 +121,52 @@ static weft_err print(const weft_invocation *inv, const weft_chart_session *sess
             fit->before_mean, fit->before_max, fit->trained_mean, fit->trained_max, fit->held_out_mean,
             fit->held_out_max);
     for (int i = 0; i < 9; i++)
-        fprintf(inv->out, "%9.5f%c", fit->to_linear_srgb.m[i], i % 3 == 2 ? '\n' : ' ');
+        fprintf(inv->out, "%9.5f%c", fit->model.matrix.m[i], i % 3 == 2 ? '\n' : ' ');
+    if (fit->model.method == WEFT_COLOUR_SEQUENCE && !fit->model.sequence.has_cubic)
+        fprintf(inv->out, "the cubic was not monotone over the patches: only the affine map is used\n");
     return WEFT_OK;
 }
 
+/* Marks the patches that the user named. */
+static weft_err exclude_patches(const weft_chart *chart, const weft_texts *names, weft_patch_colour *colours,
+                                weft_error *err)
+{
+    const int n = chart->columns * chart->rows;
+    for (int i = 0; i < names->n; i++) {
+        int patch = -1, number;
+        if (weft_text_to_int(names->values[i], &number) && number >= 1 && number <= n)
+            patch = number - 1;
+        for (int p = 0; p < n && patch < 0; p++)
+            if (strcasecmp(chart->patches[p].name, names->values[i]) == 0)
+                patch = p;
+        if (patch < 0)
+            return weft_fail(
+                err, WEFT_ERR_USAGE,
+                "--exclude %s: the chart has no such patch; give its number, 1 to %d, or its name as "
+                "\"%s\"",
+                names->values[i], n, chart->patches[0].name);
+        colours[patch].excluded = weft_patch_by_hand;
+    }
+    return WEFT_OK;
+}
+
+/* Into the calibration: the model, how good it is, and the colours it was fitted to. */
+static void keep_fit(weft_calibration *cal, const weft_chart *chart, const weft_patch_colour *colours,
+                     const weft_colour_fit *fit)
+{
+    weft_colour_part *const part = &cal->colour;
+    *part = (weft_colour_part){.model = fit->model,
+                               .delta_e_mean = fit->trained_mean,
+                               .delta_e_max = fit->trained_max,
+                               .delta_e_held_out_mean = fit->held_out_mean};
+    for (int p = 0; p < chart->columns * chart->rows; p++)
+        if (!colours[p].excluded)
+            memcpy(part->gamut[part->n_gamut++], chart->patches[p].linear_srgb, sizeof part->gamut[0]);
+    cal->has_colour = true;
+}
+
 static weft_err fit_colours(const weft_chart_session *session, const weft_patch_colour *colours,
-                            weft_colour_fit *fit, weft_error *err)
+                            weft_colour_method method, weft_colour_fit *fit, weft_error *err)
 {
     weft_colour_sample samples[WEFT_CHART_MAX_PATCHES] = {0};
     const int n = session->chart->columns * session->chart->rows;
@@ -122,7 +181,7 @@ static weft_err fit_colours(const weft_chart_session *session, const weft_patch_
         return weft_fail(err, WEFT_ERR_NODATA,
                          "%s: %d of %d patches are clipped: take the chart with a shorter exposure",
                          session->set.folder, clipped, n);
-    const weft_err status = weft_colour_fit_matrix(samples, n, fit, err);
+    const weft_err status = weft_colour_fit_patches(samples, n, method, fit, err);
     return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", session->set.folder);
 }
 
@@ -142,16 +201,16 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
     if (status == WEFT_OK)
         status = collect(&session, &args->chart, colours, err);
     if (status == WEFT_OK)
-        status = fit_colours(&session, colours, &fit, err);
+        status = exclude_patches(session.chart, &args->exclude, colours, err);
+    if (status == WEFT_OK)
+        status = fit_colours(&session, colours, (weft_colour_method)args->method, &fit, err);
     if (status == WEFT_OK) {
         if (fit.held_out_mean > doubtful_delta_e)
             weft_warn("patches that took no part are off by %.1f CIEDE2000 in the mean (1 to 2 is usual): is "
                       "it this "
                       "edition of the chart, and are the lights calibrated as they stand?",
                       fit.held_out_mean);
-        session.cal.colour =
-            (weft_colour_matrix){fit.to_linear_srgb, fit.trained_mean, fit.trained_max, fit.held_out_mean};
-        session.cal.has_colour = true;
+        keep_fit(&session.cal, session.chart, colours, &fit);
         status = weft_calibration_set_report(&session.cal, "colour",
                                              report(&session, &args->chart, colours, &fit), err);
     }
@@ -175,11 +234,12 @@ const weft_command weft_cmd_calibrate_colour = {
     .max_operands = 1,
     .args_size = sizeof(colour_args),
     .fields = fields,
-    .details = "Needs the camera's pose and the lights (weft calibrate lens, lights): each photograph is "
-               "divided by the light\n"
-               "that its lamp puts on the chart, which also balances white.  The matrix is fitted to 24 "
-               "patches; the report\n"
-               "gives CIEDE2000 before, of the patches trained on, and of patches held out.",
+    .details =
+        "Needs the camera's pose and the lights (weft calibrate lens, lights): each photograph is "
+        "divided by the light\n"
+        "that its lamp puts on the chart, which also balances white.  The report gives "
+        "CIEDE2000\nbefore, of the patches trained on, and of patches held out: believe the last.  Patches "
+        "that are clipped,\ndusty, too dark or unlike under different lights are left out and named.",
     .example = "weft calibrate colour macbeth.set -o scanner.cal --overlay found.png",
     .run = run,
 };

@@ -5,6 +5,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "host/solve/albedo_gamut.h"
 #include "host/solve/solve.h"
 
 #include <string.h>
@@ -177,6 +178,10 @@ static void print_summary(const weft_invocation *inv, const char *path, const we
             100 * answered / ((double)maps->width * maps->height),
             100 * json_number_value(json_object_get(result, "residual_mean")),
             json_number_value(json_object_get(result, "confidence_mean")), seconds);
+    char words[256];
+    weft_albedo_gamut_words(maps, words, sizeof words);
+    if (words[0])
+        fprintf(inv->out, "%s: %s\n", path, words);
 }
 
 static weft_err solve_one(const weft_invocation *inv, const solve_args *args, int i,

@@ -132,7 +132,7 @@ weft_err weft_compare_calibrations(const weft_calibration *a, const weft_calibra
         WEFT_TRY(compare_cameras(&a->camera, &b->camera, &d, err));
     for (int i = 0; i < 9 && d.has_colour; i++)
         d.matrix_max =
-            fmax(d.matrix_max, fabs(a->colour.to_linear_srgb.m[i] - b->colour.to_linear_srgb.m[i]));
+            fmax(d.matrix_max, fabs(a->colour.model.matrix.m[i] - b->colour.model.matrix.m[i]));
     *difference = d;
     return WEFT_OK;
 }

@@ -3,6 +3,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "host/solve/albedo_gamut.h"
 #include "host/solve/info.h"
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
@@ -63,18 +64,6 @@ typedef struct solve_job {
     weft_maps *maps;
 } solve_job;
 
-static void apply_matrix(const weft_mat3 *matrix, float *const rgb[3], int width)
-{
-    float m[9];
-    for (size_t i = 0; i < 9; i++)
-        m[i] = (float)matrix->m[i];
-    for (int i = 0; i < width; i++) {
-        const float r = rgb[0][i], g = rgb[1][i], b = rgb[2][i];
-        for (size_t c = 0; c < 3; c++)
-            rgb[c][i] = m[3 * c] * r + m[3 * c + 1] * g + m[3 * c + 2] * b;
-    }
-}
-
 static void solve_rows(void *context, int band, int row_begin, int row_end)
 {
     const solve_job *const job = context;
@@ -106,7 +95,7 @@ static void finish_rows(void *context, int band, int row_begin, int row_end)
         float *const rgb[3] = {weft_image_row(&m->albedo, 0, row), weft_image_row(&m->albedo, 1, row),
                                weft_image_row(&m->albedo, 2, row)};
         if (job->cal->has_colour)
-            apply_matrix(&job->cal->colour.to_linear_srgb, rgb, m->width);
+            weft_colour_model_apply_row(&job->cal->colour.model, rgb, m->width);
         for (int i = 0; i < m->width; i++) {
             if (job->inside->data && !job->inside->data[at + (size_t)i])
                 answered[i] = 0;
@@ -249,6 +238,8 @@ weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const 
     }
     if (status == WEFT_OK)
         status = weft_solve_describe(set, cal_folder, options, &seconds, &to, err);
+    if (status == WEFT_OK)
+        status = weft_albedo_gamut_note(cal, &to, err);
     if (status != WEFT_OK) {
         weft_maps_fini(&to);
         return status == WEFT_ERR_CANCELLED ? status : weft_prefix(err, status, "%s", set->name);

@@ -2,6 +2,7 @@
 #include "tests/support/support.h"
 
 #include "calibration/calibration.h"
+#include "core/json.h"
 #include "calibration/calibration_grid.h"
 #include "core/file.h"
 #include "core/mem.h"
@@ -30,7 +31,12 @@ static weft_calibration whole_calibration(void)
                    {1.5, -2.25, 600.0 + 1.0 / 3}},
         .linearity = {{0.01, 0.92}, 0.004},
         .n_lights = 2,
-        .colour = {{{1.6, -0.5, -0.1, -0.2, 1.5, -0.3, 0, -0.6, 1.6}}, 1.2, 3.4, 1.5},
+        .colour = {.model.matrix = {{1.6, -0.5, -0.1, -0.2, 1.5, -0.3, 0, -0.6, 1.6}},
+                   .delta_e_mean = 1.2,
+                   .delta_e_max = 3.4,
+                   .delta_e_held_out_mean = 1.5,
+                   .n_gamut = 2,
+                   .gamut = {{0.1, 0.2, 0.3}, {0.9, 0.8, 0.7}}},
     };
     cal.lights[0] = (weft_light){.position = {200, 30, 180},
                                  .axis = {-0.6, 0, -0.8},
@@ -80,6 +86,41 @@ static void test_round_trip_is_exact(void **state)
     assert_true(json_equal(back.other, cal.other));
     weft_calibration_fini(&cal);
     weft_calibration_fini(&back);
+}
+
+/* A matrix alone is written as version 1, which older programs read; what they would not apply is version 2.
+ */
+static void test_colour_models_come_back(void **state)
+{
+    (void)state;
+    char path[300], folder[256];
+    snprintf(folder, sizeof folder, "%s", weft_test_path("models.cal"));
+    snprintf(path, sizeof path, "%s/calibration.json", folder);
+    for (int method = 0; method < WEFT_COLOUR_METHODS; method++) {
+        weft_calibration cal = whole_calibration(), back;
+        json_t *root;
+        int version = 0;
+        weft_colour_model *const model = &cal.colour.model;
+        model->method = (weft_colour_method)method;
+        for (int i = 0; i < 18 && method == WEFT_COLOUR_ROOT_POLYNOMIAL; i++)
+            model->root[i / 6][i % 6] = 1.0 / (i + 3);
+        for (int i = 0; i < 12 && method == WEFT_COLOUR_SEQUENCE; i++) {
+            model->sequence.first[i / 4][i % 4] = 1.0 / (i + 7);
+            model->sequence.cubic[i / 4][i % 4] = -1.0 / (i + 11);
+            model->sequence.second[i / 4][i % 4] = 2.0 / (i + 13);
+            model->sequence.range[i / 4][1] = 1;
+            model->sequence.has_cubic = true;
+        }
+        assert_ok(weft_calibration_save(folder, &cal, err));
+        assert_ok(weft_json_load(path, &root, err));
+        assert_ok(weft_json_get_int(root, "version", WEFT_JSON_REQUIRED, 0, 9, &version, path, err));
+        assert_int_equal(version, method == WEFT_COLOUR_MATRIX ? 1 : 2);
+        json_decref(root);
+        assert_ok(weft_calibration_load(folder, &back, err));
+        assert_memory_equal(&back.colour, &cal.colour, sizeof cal.colour);
+        weft_calibration_fini(&back);
+        weft_calibration_fini(&cal);
+    }
 }
 
 static void test_parts_may_be_absent(void **state)
@@ -159,7 +200,19 @@ static const struct {
     weft_err code;
     const char *words;
 } refused[] = {
-    {"{\"weft\":\"calibration\",\"version\":2}", WEFT_ERR_VERSION, "update Weft"},
+    {"{\"weft\":\"calibration\",\"version\":3}", WEFT_ERR_VERSION, "update Weft"},
+    {"{\"weft\":\"calibration\",\"version\":2,\"colour\":{\"to_linear_srgb\":[1,0,0,0,1,0,0,0,1],"
+     "\"method\":\"neural\"}}",
+     WEFT_ERR_UNSUPPORTED, "does not know the method \"neural\""},
+    {"{\"weft\":\"calibration\",\"version\":2,\"colour\":{\"to_linear_srgb\":[1,0,0,0,1,0,0,0,1],"
+     "\"method\":\"root-polynomial\",\"root_polynomial\":[1,2]}}",
+     WEFT_ERR_FORMAT, "root_polynomial"},
+    {"{\"weft\":\"calibration\",\"version\":2,\"colour\":{\"to_linear_srgb\":[1,0,0,0,1,0,0,0,1],"
+     "\"method\":\"sequence\"}}",
+     WEFT_ERR_FORMAT, "sequence"},
+    {"{\"weft\":\"calibration\",\"version\":2,\"colour\":{\"to_linear_srgb\":[1,0,0,0,1,0,0,0,1],"
+     "\"gamut\":[1,2]}}",
+     WEFT_ERR_RANGE, "3 a colour"},
     {"{\"weft\":\"set\",\"version\":1}", WEFT_ERR_FORMAT, "wanted a \"calibration\""},
     {"{\"weft\":\"calibration\",\"version\":1", WEFT_ERR_FORMAT, "not JSON"},
     {"\xff\xfe", WEFT_ERR_FORMAT, "calibration.json"},
@@ -268,6 +321,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip_is_exact),
+        cmocka_unit_test(test_colour_models_come_back),
         cmocka_unit_test(test_parts_may_be_absent),
         cmocka_unit_test(test_replacing_a_grid_leaves_one_file),
         cmocka_unit_test(test_numbers_that_are_none_are_not_written),

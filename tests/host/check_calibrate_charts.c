@@ -250,14 +250,14 @@ static void test_colour_is_that_of_the_spectra(void **state)
         for (int c = 0; c < 3; c++)
             worst = fmax(worst, fabs(camera[c] / samples[p].camera[c] - 1));
     }
-    assert_ok(weft_colour_fit_matrix(samples, 24, &ideal, err));
+    assert_ok(weft_colour_fit_patches(samples, 24, WEFT_COLOUR_MATRIX, &ideal, err));
     print_message("patch colours off by %.4f at most; held out %.2f (from the spectra themselves %.2f)\n",
                   worst, cal.colour.delta_e_held_out_mean, ideal.held_out_mean);
     assert_true(worst < 0.02);
     assert_near(cal.colour.delta_e_held_out_mean, ideal.held_out_mean, 0.1);
     assert_near(cal.colour.delta_e_mean, ideal.trained_mean, 0.1);
     for (int i = 0; i < 9; i++)
-        assert_near(cal.colour.to_linear_srgb.m[i], ideal.to_linear_srgb.m[i], 0.03);
+        assert_near(cal.colour.model.matrix.m[i], ideal.model.matrix.m[i], 0.03);
 
     /* The corners: where the true camera puts the plate of the virtual scanner. */
     double corners[8];
@@ -282,6 +282,71 @@ static void test_colour_is_that_of_the_spectra(void **state)
     assert_true(weft_file_exists(patches));
 }
 
+static double held_out(const char *folder)
+{
+    weft_calibration cal;
+    assert_ok(weft_calibration_load(folder, &cal, err));
+    const double value = cal.colour.delta_e_held_out_mean;
+    weft_calibration_fini(&cal);
+    return value;
+}
+
+/* Every method, at the exposure of the set and at half of it; and maps solved with it. */
+static void test_methods_and_exposures(void **state)
+{
+    (void)state;
+    static const double half[1] = {0.02}, most[3] = {1.25, 1.05, 2.6};
+    static const char *const names[3] = {"matrix", "root-polynomial", "sequence"};
+    char folder[256], set[256], darker[256], maps[256], path[300];
+    snprintf(folder, sizeof folder, "%s", weft_test_path("methods.cal"));
+    snprintf(set, sizeof set, "%s", weft_test_path("macbeth.set"));
+    snprintf(darker, sizeof darker, "%s", weft_test_path("half.set"));
+    write_set(darker, "macbeth", half, 1, NULL);
+    write_true_calibration(folder);
+    for (int k = 0; k < 3; k++) {
+        assert_int_equal(runf("weft calibrate colour %s -o %s --method %s --force", darker, folder, names[k]),
+                         0);
+        const double at_half = held_out(folder);
+        assert_int_equal(runf("weft calibrate colour %s -o %s --method %s --force", set, folder, names[k]),
+                         0);
+        print_message("%s: held out %.3f, with half the exposure %.3f\n", names[k], held_out(folder),
+                      at_half);
+        assert_true(held_out(folder) <= most[k]);
+        assert_near(held_out(folder), at_half, 0.05);
+        snprintf(maps, sizeof maps, "%s", weft_test_path("methods.maps"));
+        assert_int_equal(
+            runf("weft solve %s -c %s -o %s --geometry sensor --resolution half --force", set, folder, maps),
+            0);
+        snprintf(path, sizeof path, "%s/maps.json", maps);
+        json_t *info;
+        assert_ok(weft_json_load(path, &info, err));
+        const json_t *const gamut = json_object_get(json_object_get(info, "result"), "gamut");
+        assert_true(json_is_object(gamut));
+        json_decref(info);
+    }
+}
+
+static void test_patches_left_out_by_hand(void **state)
+{
+    (void)state;
+    weft_calibration cal;
+    char folder[256], set[256];
+    snprintf(folder, sizeof folder, "%s", weft_test_path("exclude.cal"));
+    snprintf(set, sizeof set, "%s", weft_test_path("macbeth.set"));
+    write_true_calibration(folder);
+    assert_int_equal(runf("weft calibrate colour %s -o %s --exclude cyan --exclude 1", set, folder), 0);
+    assert_ok(weft_calibration_load(folder, &cal, err));
+    const json_t *const patches = json_object_get(weft_calibration_get_report(&cal, "colour"), "patches");
+    for (size_t p = 0; p < 24; p++) {
+        const char *const why = json_string_value(json_object_get(json_array_get(patches, p), "excluded"));
+        assert_true(p == 0 || p == 17 ? why && strcmp(why, "by hand") == 0 : !why);
+    }
+    assert_int_equal(cal.colour.n_gamut, 22);
+    weft_calibration_fini(&cal);
+    assert_int_equal(runf("weft calibrate colour %s -o %s --force --exclude magenta-ish", set, folder), 2);
+    assert_int_equal(runf("weft calibrate colour %s -o %s --force --exclude 25", set, folder), 2);
+}
+
 static void test_corners_by_hand_give_the_same(void **state)
 {
     (void)state;
@@ -298,7 +363,7 @@ static void test_corners_by_hand_give_the_same(void **state)
                      0);
     assert_ok(weft_calibration_load(folder, &given, err));
     for (int i = 0; i < 9; i++)
-        assert_near(given.colour.to_linear_srgb.m[i], found.colour.to_linear_srgb.m[i], 2e-3);
+        assert_near(given.colour.model.matrix.m[i], found.colour.model.matrix.m[i], 2e-3);
     weft_calibration_fini(&found);
     weft_calibration_fini(&given);
 }
@@ -369,6 +434,8 @@ int main(void)
         cmocka_unit_test(test_linearity_before_and_after_the_lights),
         cmocka_unit_test(test_white_balance_is_that_of_the_lamps),
         cmocka_unit_test(test_colour_is_that_of_the_spectra),
+        cmocka_unit_test(test_methods_and_exposures),
+        cmocka_unit_test(test_patches_left_out_by_hand),
         cmocka_unit_test(test_corners_by_hand_give_the_same),
         cmocka_unit_test(test_a_slight_gamma_is_seen_in_one_exposure),
         cmocka_unit_test(test_refusals_leave_the_calibration_alone),

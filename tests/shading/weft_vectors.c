@@ -1,4 +1,5 @@
 /* weft-vectors DIR|FILE...: tables of reference values against the functions of this build. */
+#include "calibration/charts/colour_vectors.h"
 #include "core/file.h"
 #include "core/text.h"
 #include "shading/vectors/vectors.h"
@@ -52,7 +53,9 @@ static void run_file(const char *path, tally *count)
     char stem[128];
     const char *const name = weft_path_name(path);
     snprintf(stem, sizeof stem, "%.*s", (int)strcspn(name, "."), name);
-    const weft_vectors_model *const model = weft_vectors_find(stem);
+    const weft_vectors_model *const shading = weft_vectors_find(stem);
+    const weft_vectors_model *const model =
+        shading ? shading : weft_vectors_find_in(weft_calibration_vectors, stem);
     if (!model) {
         printf("%s: no model in this build\n", stem);
         count->skipped++;

@@ -1,4 +1,4 @@
-#include "shading/vectors/vectors.h"
+#include "core/vectors.h"
 
 #include "core/mem.h"
 
@@ -7,15 +7,11 @@
 #include <stdio.h>
 #include <string.h>
 
-const weft_vectors_model *weft_vectors_find(const char *stem)
+const weft_vectors_model *weft_vectors_find_in(const weft_vectors_model *table, const char *stem)
 {
-    static const weft_vectors_model *const subjects[] = {weft_vectors_reflectance,
-                                                         weft_vectors_more_reflectance, weft_vectors_lighting,
-                                                         weft_vectors_bake, weft_vectors_skin};
-    for (size_t i = 0; i < sizeof subjects / sizeof subjects[0]; i++)
-        for (const weft_vectors_model *m = subjects[i]; m->stem; m++)
-            if (strcmp(m->stem, stem) == 0)
-                return m;
+    for (const weft_vectors_model *m = table; m->stem; m++)
+        if (strcmp(m->stem, stem) == 0)
+            return m;
     return NULL;
 }
 
