@@ -22,6 +22,8 @@
 #define CLIPPED_SHARE 0.001
 /* A room this bright costs range and adds its own noise. */
 #define BRIGHT_ROOM 0.05
+/* How long an unplugged controller is waited for. */
+#define COMES_BACK_WITHIN_S 10
 /* A DNG is its samples and some tags. */
 #define DNG_TAGS_BYTES 65536
 #define SPARE_BYTES    (UINT64_C(4) << 20)
@@ -167,10 +169,37 @@ static void check_brightness(const capture_run *run, const weft_planned_frame *f
     if (!frame->lights || !frame->middle || !run->has_dark_mean)
         return;
     if (shot->stats.mean <= without * BRIGHTER_FACTOR + BRIGHTER_OFFSET)
-        snprintf(
-            shot->reason, sizeof shot->reason,
-            "no brighter than without it (%.2f %% of the range, without %.2f %%): is the lamp connected?",
-            100 * shot->stats.mean, 100 * without);
+        snprintf(shot->reason, sizeof shot->reason,
+                 "no brighter than without it (%.2f %% of the range, without %.2f %%): %s",
+                 100 * shot->stats.mean, 100 * without,
+                 without > BRIGHT_ROOM ? "does this lamp shine all the time?" : "is the lamp connected?");
+}
+
+/* A cable that was pulled out may be put in again.  Meanwhile the controller goes dark by itself, and what
+ * was being exposed is void.  Any other failure stays one. */
+static weft_err come_back(capture_run *run, weft_err status, weft_error *why, weft_error *err)
+{
+    weft_controller *const c = run->shooter.controller;
+    if (!weft_controller_is_gone(c)) {
+        if (err)
+            *err = *why;
+        return status;
+    }
+    weft_warn("%s; waiting %d s for it", why->text, COMES_BACK_WITHIN_S);
+    return weft_controller_reopen(c, COMES_BACK_WITHIN_S, err);
+}
+
+/* One exposure; a controller that was unplugged and is back gives a reason to take it again. */
+static weft_err shoot(capture_run *run, const weft_planned_frame *frame, weft_shot *shot, weft_error *err)
+{
+    weft_error why = {0};
+    const weft_err status =
+        weft_shoot(&run->shooter, frame->lights, frame->exposure_s, run->o.gain, shot, &why);
+    if (status == WEFT_OK)
+        return WEFT_OK;
+    WEFT_TRY(come_back(run, status, &why, err));
+    snprintf(shot->reason, sizeof shot->reason, "the light controller was unplugged");
+    return WEFT_OK;
 }
 
 /* Takes the frame until it is good.  `retries` gets a reason for each one that was not. */
@@ -180,8 +209,7 @@ static weft_err shoot_until_good(capture_run *run, const weft_planned_frame *fra
     char what[32];
     name_frame(frame, what);
     for (int try = 1;; try++) {
-        const weft_err status =
-            weft_shoot(&run->shooter, frame->lights, frame->exposure_s, run->o.gain, shot, err);
+        const weft_err status = shoot(run, frame, shot, err);
         if (status != WEFT_OK)
             return weft_prefix(err, status, "%s", what);
         if (!shot->reason[0])
@@ -337,11 +365,12 @@ static weft_err keep_frame_awake(capture_run *run, const weft_planned_frame *fra
         if (awake == WEFT_OK)
             awake = weft_shooter_keep_alive(&run->shooter, &sleepy);
     }
-    if (err && job.status != WEFT_OK)
-        *err = job.error;
-    else if (err && awake != WEFT_OK)
-        *err = sleepy;
-    return job.status != WEFT_OK ? job.status : awake;
+    if (job.status != WEFT_OK) {
+        if (err)
+            *err = job.error;
+        return job.status;
+    }
+    return awake == WEFT_OK ? WEFT_OK : come_back(run, awake, &sleepy, err);
 }
 
 static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_error *err)

@@ -142,6 +142,20 @@ static weft_err say_lit(const weft_invocation *inv, const weft_controller_info *
     return WEFT_OK;
 }
 
+enum { COMES_BACK_WITHIN_S = 30 };
+
+/* `status` is a failure with `why`: one that a cable may mend that is put in again is waited out. */
+static weft_err come_back(weft_controller *c, weft_err status, const weft_error *why, weft_error *err)
+{
+    if (!weft_controller_is_gone(c)) {
+        if (err)
+            *err = *why;
+        return status;
+    }
+    weft_warn("%s; waiting %d s for it", why->text, COMES_BACK_WITHIN_S);
+    return weft_controller_reopen(c, COMES_BACK_WITHIN_S, err);
+}
+
 /* Asks again often enough for lease and time limit; the firmware does not blink at that. */
 static weft_err hold(weft_controller *c, uint32_t mask, int level, int max_on_ms, double seconds,
                      weft_error *err)
@@ -156,8 +170,12 @@ static weft_err hold(weft_controller *c, uint32_t mask, int level, int max_on_ms
             return seconds > 0 ? weft_fail(err, WEFT_ERR_CANCELLED, "cancelled; the lights are off")
                                : WEFT_OK;
         if (now_s - renewed_s >= renew_s) {
-            WEFT_TRY(weft_controller_light(c, mask, level, max_on_ms, NULL, err));
-            renewed_s = now_s;
+            weft_error why = {0};
+            const weft_err status = weft_controller_light(c, mask, level, max_on_ms, NULL, &why);
+            if (status == WEFT_OK)
+                renewed_s = now_s;
+            else
+                WEFT_TRY(come_back(c, status, &why, err));
         }
         const struct timespec nap = {.tv_nsec = (long)(1e9 * fmin(left_s, 0.02))};
         nanosleep(&nap, NULL);
@@ -270,7 +288,12 @@ static weft_err watch(const weft_invocation *inv, weft_controller *c, weft_error
     while (!weft_cancelled()) {
         weft_controller_status s;
         char lights[128];
-        WEFT_TRY(weft_controller_get_status(c, &s, err));
+        weft_error why = {0};
+        const weft_err status = weft_controller_get_status(c, &s, &why);
+        if (status != WEFT_OK) {
+            WEFT_TRY(come_back(c, status, &why, err));
+            continue;
+        }
         print_mask(s.lights, lights, sizeof lights);
         if (inv->json)
             WEFT_TRY(print_status(inv, weft_controller_get_info(c), &s, err));

@@ -3,11 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static weft_err choose_port(char port[256], weft_error *err)
+static weft_err choose_port(const char *dev, char port[256], weft_error *err)
 {
     char **ports = NULL, list[600] = "";
     int n = 0;
-    WEFT_TRY(weft_controller_list_ports(&ports, err));
+    WEFT_TRY(weft_controller_list_ports_under(dev, &ports, err));
     for (; ports[n]; n++) {
         const size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", n ? ", " : "", ports[n]);
@@ -35,8 +35,8 @@ weft_err weft_device_open_controller(const weft_device_names *names, weft_contro
     if (names->port[0])
         snprintf(port, sizeof port, "%s", names->port);
     else
-        WEFT_TRY(choose_port(port, err));
-    return weft_controller_open(port, WEFT_DEVICE_LEASE_MS, controller, err);
+        WEFT_TRY(choose_port(names->dev, port, err));
+    return weft_controller_open_under(names->dev, port, WEFT_DEVICE_LEASE_MS, controller, err);
 }
 
 weft_err weft_device_open_both(const weft_device_options *options, weft_camera_device **camera,

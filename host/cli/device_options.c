@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <limits.h>
 #include <signal.h>
+#include <stdio.h>
 #include <string.h>
 
 #define RIG_VERSION 1
@@ -40,11 +41,23 @@ static weft_err read_rig(const json_t *rig, const char *folder, const char *plac
     const char *pty = NULL, *camera = NULL;
     WEFT_TRY(check_alive(rig, folder, place, err));
     WEFT_TRY(weft_json_get_text(rig, "pty", WEFT_JSON_REQUIRED, &pty, place, err));
+    if (!pty[0])
+        return weft_fail(err, WEFT_ERR_DEVICE,
+                         "%s: its light controller is unplugged; weft rig --dir %s --tell \"board plug\"",
+                         folder, folder);
     WEFT_TRY(weft_json_get_text(rig, "camera", WEFT_JSON_REQUIRED, &camera, place, err));
     if (copy_name(names->port, sizeof names->port, pty, "rig", NULL) != WEFT_OK ||
         copy_name(names->camera, sizeof names->camera, camera, "rig", NULL) != WEFT_OK)
         return weft_fail(err, WEFT_ERR_FORMAT, "%s: \"pty\" or \"camera\" is empty or too long", place);
     return WEFT_OK;
+}
+
+/* The rig's ports lie in DIR/dev, as a computer's in /dev. */
+static weft_err name_dev(const char *folder, weft_device_names *names, weft_error *err)
+{
+    if (snprintf(names->dev, sizeof names->dev, "%s/dev", folder) < (int)sizeof names->dev)
+        return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_USAGE, "%s: the path of this folder is too long", folder);
 }
 
 static weft_err load_rig(const char *folder, weft_device_names *names, weft_error *err)
@@ -63,6 +76,8 @@ static weft_err load_rig(const char *folder, weft_device_names *names, weft_erro
         status = weft_json_load_kind(path, "rig", RIG_VERSION, &rig, err);
     if (status == WEFT_OK)
         status = read_rig(rig, folder, path, names, err);
+    if (status == WEFT_OK)
+        status = name_dev(folder, names, err);
     json_decref(rig);
     weft_free(path);
     return status;
@@ -71,7 +86,7 @@ static weft_err load_rig(const char *folder, weft_device_names *names, weft_erro
 weft_err weft_device_options_resolve(const weft_device_options *options, weft_device_names *names,
                                      weft_error *err)
 {
-    weft_device_names resolved = {.camera = "auto"};
+    weft_device_names resolved = {.dev = "/dev", .camera = "auto"};
     if (options->rig)
         WEFT_TRY(load_rig(options->rig, &resolved, err));
     if (options->port)

@@ -35,7 +35,7 @@ typedef struct weft_device_options {
     {                                                                                                        \
         .key = "port", .type = WEFT_FIELD_TEXT,                                                              \
         .offset = offsetof(args_type, member) + offsetof(weft_device_options, port), .unit = "TTY",          \
-        .help = "serial line of the light controller (else the rig's, else the only one there is)"           \
+        .help = "light controller's serial line, or serial:NUMBER (else the rig's, else the only one)"       \
     }
 #define WEFT_CAMERA_FIELD(args_type, member)                                                                 \
     {                                                                                                        \
@@ -55,7 +55,8 @@ typedef struct weft_device_options {
 
 /** What to open. */
 typedef struct weft_device_names {
-    char port[256];   /* "/dev/ttyACM0"; empty: find the only one there is */
+    char port[256];   /* "/dev/ttyACM0", "serial:WL-00042"; empty: find the only one there is */
+    char dev[512];    /* where ports are looked for: "/dev", or the rig's */
     char camera[128]; /* "aravis:127.0.0.1"; "auto" when nothing was said */
 } weft_device_names;
 

@@ -1,21 +1,20 @@
 #include "host/light/controller.h"
 
 #include "core/log.h"
-#include "core/mem.h"
 #include "core/progress.h"
 #include "host/light/controller_crash.h"
 #include "host/light/controller_private.h"
 
 #include <stdio.h>
 #include <string.h>
-#include <sys/random.h>
 
 /* How long the n-th try waits for its reply.  A board answers within a millisecond: the waits are for
  * damaged frames and for a busy computer. */
 static const int try_ms[] = {30, 30, 40, 50, 50, 100, 100, 150, 200, 200};
 enum { N_TRIES = sizeof try_ms / sizeof try_ms[0] };
 
-static const double hello_every_s = 0.2, hello_within_s = 3; /* an Uno's bootloader takes up to 1.5 s */
+/* Storing a setting takes the EEPROM 3.4 ms a byte. */
+enum { STORE_MS = 250 };
 
 /* -- frames --------------------------------------------------------------------------------------------- */
 
@@ -83,9 +82,8 @@ weft_err weft_controller_next_event(weft_controller *c, double deadline_s, weft_
     return WEFT_OK;
 }
 
-/* The reply to `seq`, or any complaint of a damaged frame: only one command is ever under way. */
-static weft_err next_reply(weft_controller *c, uint8_t seq, uint8_t command, double deadline_s,
-                           weft_frame *reply, bool *got, weft_error *err)
+weft_err weft_controller_next_reply(weft_controller *c, uint8_t seq, uint8_t command, double deadline_s,
+                                    weft_frame *reply, bool *got, weft_error *err)
 {
     for (;;) {
         WEFT_TRY(next_frame(c, deadline_s, reply, got, err));
@@ -100,8 +98,8 @@ static weft_err next_reply(weft_controller *c, uint8_t seq, uint8_t command, dou
     }
 }
 
-static uint8_t encode_request(weft_controller *c, uint8_t command, const uint8_t *payload, uint8_t n,
-                              uint8_t *wire)
+uint8_t weft_controller_encode(weft_controller *c, uint8_t command, const uint8_t *payload, uint8_t n,
+                               uint8_t *wire)
 {
     weft_frame request = {.version = WEFT_PROTOCOL_MAJOR,
                           .type = WEFT_FRAME_REQUEST,
@@ -118,14 +116,16 @@ static weft_err transact(weft_controller *c, uint8_t command, const uint8_t *pay
                          weft_frame *reply, weft_error *err)
 {
     uint8_t wire[WEFT_FRAME_WIRE_MAX];
-    const uint8_t length = encode_request(c, command, payload, n, wire);
+    const uint8_t length = weft_controller_encode(c, command, payload, n, wire);
     const double begin_s = weft_clock_s();
+    const double on_the_line_s = 10.0 * (length + WEFT_FRAME_WIRE_MAX) / c->serial.rate;
+    const int storing_ms = command == WEFT_CMD_CFG_SET ? STORE_MS : 0;
     for (int i = 0; i < N_TRIES; i++) {
         bool got;
-        const double deadline_s = weft_clock_s() + 1e-3 * try_ms[i];
+        const double deadline_s = weft_clock_s() + 1e-3 * (try_ms[i] + storing_ms) + on_the_line_s;
         c->retries += i > 0;
         WEFT_TRY(weft_serial_write(&c->serial, wire, length, deadline_s, err));
-        WEFT_TRY(next_reply(c, c->seq, command, deadline_s, reply, &got, err));
+        WEFT_TRY(weft_controller_next_reply(c, c->seq, command, deadline_s, reply, &got, err));
         if (got && reply->payload[0] != WEFT_STATUS_BAD_CRC)
             return WEFT_OK;
     }
@@ -167,8 +167,8 @@ static weft_err check_not_safe(const weft_controller *c, const weft_status_reply
                      weft_protocol_cause_text(status->safe_cause));
 }
 
-/* Turns a refusal into what the user needs to know: mostly that the board is not where we left it. */
-static weft_err refused(weft_controller *c, uint8_t command, uint8_t code, weft_error *err)
+/* Mostly, the board is not where we left it. */
+weft_err weft_controller_refused(weft_controller *c, uint8_t command, uint8_t code, weft_error *err)
 {
     weft_status_reply status;
     if (code == WEFT_STATUS_NOT_LEASED || code == WEFT_STATUS_SAFE_LATCHED) {
@@ -193,145 +193,13 @@ weft_err weft_controller_command(weft_controller *c, uint8_t number, const uint8
 {
     WEFT_TRY(transact(c, number, payload, n, reply, err));
     if (reply->payload[0] != WEFT_STATUS_OK)
-        return refused(c, number, reply->payload[0], err);
+        return weft_controller_refused(c, number, reply->payload[0], err);
     if (reply->n < bytes + 1)
         return weft_fail(err, WEFT_ERR_PROTOCOL,
                          "%s: the reply to %s is cut (wanted %d bytes, got %d); flash the firmware of this "
                          "build, docs/hardware.md says how",
                          c->serial.name, weft_protocol_command_name(number), bytes + 1, reply->n);
     return WEFT_OK;
-}
-
-/* -- opening -------------------------------------------------------------------------------------------- */
-
-static weft_err nobody_there(const weft_controller *c, weft_error *err)
-{
-    if (c->n_bytes == 0)
-        return weft_fail(err, WEFT_ERR_TIMEOUT,
-                         "%s: nobody answers within %.0f s; is this the light controller, and has it the "
-                         "Weft firmware (docs/hardware.md says how to flash it)?",
-                         c->serial.name, hello_within_s);
-    return weft_fail(err, WEFT_ERR_PROTOCOL,
-                     "%s: something answers, but it is no Weft light controller (%zu bytes without sense); "
-                     "try another port, or flash the firmware, docs/hardware.md says how",
-                     c->serial.name, c->n_bytes);
-}
-
-static weft_err other_version(const weft_controller *c, int major, weft_error *err)
-{
-    return weft_fail(err, WEFT_ERR_PROTOCOL,
-                     "%s: the light controller speaks protocol %d, this program %d; flash the firmware of "
-                     "this build, docs/hardware.md says how",
-                     c->serial.name, major, WEFT_PROTOCOL_MAJOR);
-}
-
-/* HELLO until there is an answer, or it is clear that none will come. */
-static weft_err say_hello(weft_controller *c, weft_hello_reply *hello, weft_error *err)
-{
-    weft_hello_request request = {.proto_major = WEFT_PROTOCOL_MAJOR, .proto_minor = WEFT_PROTOCOL_MINOR};
-    uint8_t payload[WEFT_HELLO_REQUEST_BYTES], wire[1 + WEFT_FRAME_WIRE_MAX];
-    if (getrandom(&request.salt, sizeof request.salt, 0) != sizeof request.salt)
-        request.salt = (uint32_t)(1e6 * weft_clock_s());
-    c->seq = (uint8_t)request.salt; /* not the last program's number again */
-    weft_hello_request_encode(&request, payload);
-    wire[0] = 0; /* ends whatever a modem probe or an old program left half-said */
-    const uint8_t length =
-        (uint8_t)(1 + encode_request(c, WEFT_CMD_HELLO, payload, sizeof payload, wire + 1));
-    const double end_s = weft_clock_s() + hello_within_s;
-    while (weft_clock_s() < end_s) {
-        weft_frame reply;
-        bool got;
-        const double deadline_s = weft_clock_s() + hello_every_s;
-        WEFT_TRY(weft_serial_write(&c->serial, wire, length, deadline_s, err));
-        WEFT_TRY(next_reply(c, c->seq, WEFT_CMD_HELLO, deadline_s, &reply, &got, err));
-        if (!got || reply.payload[0] == WEFT_STATUS_BAD_CRC)
-            continue;
-        if (reply.version != WEFT_PROTOCOL_MAJOR)
-            return other_version(c, reply.version, err);
-        if (reply.payload[0] != WEFT_STATUS_OK)
-            return refused(c, WEFT_CMD_HELLO, reply.payload[0], err);
-        weft_hello_reply_decode(reply.payload + 1, (uint8_t)(reply.n - 1), hello);
-        if (hello->magic != WEFT_PROTOCOL_MAGIC)
-            return nobody_there(c, err);
-        if (hello->proto_major != WEFT_PROTOCOL_MAJOR)
-            return other_version(c, hello->proto_major, err);
-        return WEFT_OK;
-    }
-    return nobody_there(c, err);
-}
-
-static void fill_info(weft_controller *c, const weft_hello_reply *hello)
-{
-    weft_controller_info *const info = &c->info;
-    *info = (weft_controller_info){
-        .protocol_major = hello->proto_major,
-        .protocol_minor = hello->proto_minor,
-        .n_lights = hello->n_lights,
-        .level_max = hello->level_max,
-        .max_on_ms = hello->max_on_ms,
-        .tick_hz = hello->tick_hz,
-        .boot_nonce = hello->boot_nonce,
-        .capabilities = hello->capabilities,
-        .max_steps = hello->max_steps,
-        .settings = weft_protocol_settings_name(hello->settings_state),
-    };
-    snprintf(info->port, sizeof info->port, "%s", c->serial.name);
-    snprintf(info->firmware, sizeof info->firmware, "%d.%d.%d", hello->fw_version[0], hello->fw_version[1],
-             hello->fw_version[2]);
-    snprintf(info->git_id, sizeof info->git_id, "%.*s", (int)sizeof hello->git_id,
-             (const char *)hello->git_id);
-    snprintf(info->serial_number, sizeof info->serial_number, "%.*s", (int)sizeof hello->serial_number,
-             (const char *)hello->serial_number);
-    snprintf(info->reset_cause, sizeof info->reset_cause, "%s", weft_protocol_reset_name(hello->reset_cause));
-}
-
-static weft_err take_lease(weft_controller *c, int lease_ms, weft_error *err)
-{
-    const weft_lease_request request = {.lease_ms = (uint16_t)lease_ms};
-    uint8_t payload[WEFT_LEASE_REQUEST_BYTES];
-    weft_frame reply;
-    weft_lease_request_encode(&request, payload);
-    return weft_controller_command(c, WEFT_CMD_LEASE, payload, sizeof payload, WEFT_LEASE_REPLY_BYTES, &reply,
-                                   err);
-}
-
-weft_err weft_controller_open(const char *port, int lease_ms, weft_controller **controller, weft_error *err)
-{
-    if (lease_ms < 100 || lease_ms > 5000)
-        return weft_fail(err, WEFT_ERR_RANGE, "a lease of %d ms: wanted 100 to 5000", lease_ms);
-    weft_controller *const c = weft_alloc(1, sizeof *c, err);
-    if (!c)
-        return WEFT_ERR_NOMEM;
-    c->serial.fd = -1;
-    weft_hello_reply hello;
-    weft_err status = weft_serial_open(&c->serial, port, err);
-    if (status == WEFT_OK)
-        status = say_hello(c, &hello, err);
-    if (status == WEFT_OK) {
-        fill_info(c, &hello);
-        status = take_lease(c, lease_ms, err);
-    }
-    if (status == WEFT_OK) {
-        weft_explain("%s: light controller, firmware %s (%s), %d lights, last start: %s", port,
-                     c->info.firmware, c->info.git_id, c->info.n_lights, c->info.reset_cause);
-        *controller = c;
-    } else {
-        weft_serial_close(&c->serial);
-        weft_free(c);
-    }
-    return status;
-}
-
-void weft_controller_close(weft_controller *c)
-{
-    if (!c)
-        return;
-    static const uint8_t panic[WEFT_PANIC_ZEROS];
-    if (take_lease(c, 0, NULL) != WEFT_OK)
-        (void)weft_serial_write(&c->serial, panic, sizeof panic, weft_clock_s() + 0.1, NULL);
-    weft_controller_forget_crash(c->serial.fd);
-    weft_serial_close(&c->serial);
-    weft_free(c);
 }
 
 /* -- commands ------------------------------------------------------------------------------------------- */
@@ -417,6 +285,11 @@ weft_err weft_controller_keep_alive(weft_controller *c, weft_error *err)
     WEFT_TRY(ask_status(c, &s, err));
     WEFT_TRY(check_same_boot(c, &s, err));
     return check_not_safe(c, &s, err);
+}
+
+bool weft_controller_is_gone(const weft_controller *c)
+{
+    return c->serial.gone;
 }
 
 int weft_controller_panic_fd(const weft_controller *c)

@@ -32,6 +32,7 @@ typedef struct weft_controller_info {
     int max_steps;         /* longest sequence; 0: none */
     const char *settings;  /* "DEFAULTS", "LOADED", "UNREADABLE" */
     char reset_cause[32];  /* "POWER_ON", "WATCHDOG", ... */
+    int baud;              /* 500000, or 38400 for firmware that was built for bad cables */
 } weft_controller_info;
 
 typedef struct weft_controller_status {
@@ -48,10 +49,28 @@ typedef struct weft_controller_status {
 } weft_controller_status;
 
 /** Opens the port exclusively, shakes hands (waits out a bootloader for 3 s) and takes a lease.
+ *  @param port      "/dev/ttyACM0", or "serial:WL-00042" for the board with that number on whatever port
  *  @param lease_ms  the lights go off when the host is silent for that long; 100..5000
  *  @return WEFT_ERR_DEVICE (no such port, no permission, in use, unplugged), _TIMEOUT (nobody answers),
  *          _PROTOCOL (something else answers, or firmware of another version) with port and remedy */
 weft_err weft_controller_open(const char *port, int lease_ms, weft_controller **controller, weft_error *err);
+
+/** The same with another folder than /dev to look for serial numbers in, now and in weft_controller_reopen().
+ */
+weft_err weft_controller_open_under(const char *dev, const char *port, int lease_ms,
+                                    weft_controller **controller, weft_error *err);
+
+/** Whether its port has vanished: the cable is out.  Its lights go off by the end of the lease. */
+bool weft_controller_is_gone(const weft_controller *controller);
+
+/**
+ * Looks for the board again, on whatever port, by its serial number, until timeout_s from now; then shakes
+ * hands and takes the lease anew.  What was going on is void: lights are off, the sequence table is empty.
+ *
+ * @return WEFT_ERR_DEVICE when it did not come back, or with other settings: then only close it, or try
+ * again; WEFT_ERR_CANCELLED
+ */
+weft_err weft_controller_reopen(weft_controller *controller, double timeout_s, weft_error *err);
 
 /** Lights off, lease given back (by the panic bytes when the board does not answer), port closed.  NULL is
  *  fine. */

@@ -45,7 +45,7 @@ void weft_controller_watch_crash(int fd)
         sigaction(deadly[i], &action, &before[i]);
 }
 
-void weft_controller_forget_crash(int fd)
+bool weft_controller_forget_crash(int fd)
 {
-    atomic_compare_exchange_strong(&panic_fd, &fd, -1);
+    return fd >= 0 && atomic_compare_exchange_strong(&panic_fd, &fd, -1);
 }

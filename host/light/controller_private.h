@@ -22,7 +22,23 @@ struct weft_controller {
     weft_frame events[MAX_EVENTS]; /* that came and nobody has asked for, the oldest first */
     int n_events;
     weft_controller_info info;
+    int lease_ms;
+    char dev[512]; /* where it is looked for when its port has vanished */
 };
+
+/* -- frames (controller.c) */
+
+/** A request with the next sequence number, as it goes over the line.  @return its bytes */
+uint8_t weft_controller_encode(weft_controller *c, uint8_t command, const uint8_t *payload, uint8_t n,
+                               uint8_t *wire);
+
+/** The reply to `seq`, or any complaint of a damaged frame: only one command is ever under way.  *got is
+ * false at the deadline. */
+weft_err weft_controller_next_reply(weft_controller *c, uint8_t seq, uint8_t command, double deadline_s,
+                                    weft_frame *reply, bool *got, weft_error *err);
+
+/** Turns a refusal into what the user needs to know.  @return never WEFT_OK */
+weft_err weft_controller_refused(weft_controller *c, uint8_t command, uint8_t code, weft_error *err);
 
 /** A command whose reply must be OK; `reply` is then at least `bytes` long behind its status.  Events on the
  *  way are kept. */

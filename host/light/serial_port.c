@@ -44,7 +44,13 @@ static int lock(int fd)
     return ioctl(fd, TIOCEXCL) != 0 && errno != ENOTTY ? -1 : 0;
 }
 
-static int make_raw(int fd)
+static int set_speed(struct termios *t, int rate)
+{
+    const speed_t speed = rate == 500000 ? B500000 : B38400;
+    return cfsetispeed(t, speed) != 0 || cfsetospeed(t, speed) != 0 ? -1 : 0;
+}
+
+static int make_raw(int fd, int rate)
 {
     struct termios t;
     if (tcgetattr(fd, &t) != 0)
@@ -54,7 +60,7 @@ static int make_raw(int fd)
     t.c_cflag &= ~(tcflag_t)(HUPCL | CSTOPB | CRTSCTS);
     t.c_cc[VMIN] = 0;
     t.c_cc[VTIME] = 0;
-    if (cfsetispeed(&t, B500000) != 0 || cfsetospeed(&t, B500000) != 0)
+    if (set_speed(&t, rate) != 0)
         return -1;
     return tcsetattr(fd, TCSANOW, &t);
 }
@@ -65,10 +71,12 @@ weft_err weft_serial_open(weft_serial *serial, const char *port, weft_error *err
     if (serial->fd < 0)
         return why_not_open(port, err);
     snprintf(serial->name, sizeof serial->name, "%s", port);
+    serial->rate = 500000;
+    serial->gone = false;
     weft_err status = WEFT_OK;
     if (lock(serial->fd) != 0)
         status = why_not_open(port, err);
-    else if (make_raw(serial->fd) != 0)
+    else if (make_raw(serial->fd, serial->rate) != 0)
         status = errno == ENOTTY ? weft_fail(err, WEFT_ERR_DEVICE, "%s: this is not a serial port", port)
                                  : weft_fail_errno(err, WEFT_ERR_DEVICE,
                                                    "%s: the port cannot be set to 500 000 baud", port);
@@ -79,22 +87,48 @@ weft_err weft_serial_open(weft_serial *serial, const char *port, weft_error *err
     return status;
 }
 
+weft_err weft_serial_set_rate(weft_serial *serial, int rate, weft_error *err)
+{
+    struct termios t;
+    if (rate == serial->rate)
+        return WEFT_OK;
+    if (tcgetattr(serial->fd, &t) != 0 || set_speed(&t, rate) != 0 || tcsetattr(serial->fd, TCSANOW, &t) != 0)
+        return weft_fail_errno(err, WEFT_ERR_DEVICE, "%s: the port cannot be set to %d baud", serial->name,
+                               rate);
+    tcflush(serial->fd, TCIFLUSH);
+    serial->rate = rate;
+    return WEFT_OK;
+}
+
+/* close() would wait up to 30 s for a device that takes nothing (closing_wait of the kernel). */
+static void drain(int fd)
+{
+    int waiting = 0;
+    for (int i = 0; i < 20 && ioctl(fd, TIOCOUTQ, &waiting) == 0 && waiting > 0; i++)
+        poll(NULL, 0, 10);
+    if (waiting > 0)
+        tcflush(fd, TCOFLUSH);
+}
+
 void weft_serial_close(weft_serial *serial)
 {
-    if (serial->fd >= 0)
+    if (serial->fd >= 0) {
+        if (!serial->gone)
+            drain(serial->fd);
         close(serial->fd);
+    }
     serial->fd = -1;
 }
 
-static weft_err gone(const weft_serial *serial, weft_error *err)
+static weft_err gone(weft_serial *serial, weft_error *err)
 {
+    serial->gone = true;
     return weft_fail(err, WEFT_ERR_DEVICE, "%s: the light controller has vanished; is its USB cable in?",
                      serial->name);
 }
 
 /* Waits for `events`; *ready is false at the deadline. */
-static weft_err wait_for(const weft_serial *serial, short events, double deadline_s, bool *ready,
-                         weft_error *err)
+static weft_err wait_for(weft_serial *serial, short events, double deadline_s, bool *ready, weft_error *err)
 {
     for (;;) {
         const double left_s = deadline_s - weft_clock_s();
@@ -110,7 +144,7 @@ static weft_err wait_for(const weft_serial *serial, short events, double deadlin
     }
 }
 
-weft_err weft_serial_write(const weft_serial *serial, const uint8_t *bytes, size_t n, double deadline_s,
+weft_err weft_serial_write(weft_serial *serial, const uint8_t *bytes, size_t n, double deadline_s,
                            weft_error *err)
 {
     while (n > 0) {
@@ -132,8 +166,8 @@ weft_err weft_serial_write(const weft_serial *serial, const uint8_t *bytes, size
     return WEFT_OK;
 }
 
-weft_err weft_serial_read(const weft_serial *serial, uint8_t *bytes, size_t room, double deadline_s,
-                          size_t *n, weft_error *err)
+weft_err weft_serial_read(weft_serial *serial, uint8_t *bytes, size_t room, double deadline_s, size_t *n,
+                          weft_error *err)
 {
     bool ready;
     *n = 0;

@@ -15,6 +15,7 @@
 #include "core/version.h"
 #include "host/rig/dslr.h"
 #include "host/rig/render_set.h"
+#include "host/rig/rig_board.h"
 #include "host/rig/rig_camera.h"
 #include "host/rig/rig_control.h"
 #include "host/rig/rig_options.h"
@@ -78,13 +79,37 @@ static const weft_field fields[] = {
 typedef struct rig {
     const rig_args *args;
     char *firmware, *json_path, *socket_path;
-    char pty[128];
     weft_rig_stage *stage;
     weft_controller_sim *sim;
+    weft_rig_board board;
     weft_rig_camera *camera;
     weft_dslr *dslr;
     weft_rig_control *control;
 } rig;
+
+/* rig.json, and at the start the same on stdout. */
+static weft_err announce(const rig *r, bool print, weft_error *err)
+{
+    char camera[80], dslr[112];
+    const weft_rig_scene *const scene = weft_rig_stage_scene(r->stage);
+    snprintf(camera, sizeof camera, "aravis:%s", r->args->options.address);
+    snprintf(dslr, sizeof dslr, "gphoto:ptpip:%s:%d", r->args->options.address, weft_dslr_port(r->dslr));
+    json_t *const json = json_pack(
+        "{s:s, s:i, s:s, s:s, s:[s,s], s:s, s:i, s:[i,i], s:I, s:s, s:s}", "weft", "rig", "version",
+        RIG_VERSION, "pty", r->board.pty, "camera", camera, "cameras", camera, dslr, "control",
+        r->socket_path, "pid", (int)getpid(), "size", scene->camera.width, scene->camera.height, "seed",
+        (json_int_t)scene->setup.seed, "firmware", r->firmware, "program", "weft-rig " WEFT_VERSION);
+    if (!json)
+        return weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
+    const weft_err status = weft_json_save(r->json_path, json, err);
+    if (status == WEFT_OK && print) {
+        json_dumpf(json, stdout, JSON_COMPACT);
+        putchar('\n');
+        fflush(stdout);
+    }
+    json_decref(json);
+    return status;
+}
 
 /* ------------------------------------------------------------------------------------------ commands */
 
@@ -113,20 +138,26 @@ static json_t *obey_samples(void)
     return json_pack("{s:b, s:o}", "ok", 1, "samples", list);
 }
 
+static json_t *list_lamps(uint32_t mask)
+{
+    json_t *const list = json_array();
+    for (int i = 0; i < WEFT_SIM_N_LIGHTS; i++)
+        if (mask & UINT32_C(1) << i)
+            json_array_append_new(list, json_integer(i));
+    return list;
+}
+
 static json_t *obey_state(const rig *r)
 {
     weft_controller_sim_counters counters;
     double dark_for_s = 0;
     weft_controller_sim_get_counters(r->sim, &counters);
     const uint32_t lit = weft_controller_sim_lights(r->sim, &dark_for_s);
-    json_t *const lights = json_array();
-    for (int i = 0; i < WEFT_SIM_N_LIGHTS; i++)
-        if (lit & UINT32_C(1) << i)
-            json_array_append_new(lights, json_integer(i));
-    return json_pack("{s:b, s:s, s:o, s:f, s:I, s:i, s:i, s:f}", "ok", 1, "sample",
-                     weft_rig_stage_sample(r->stage)->name, "lights_on", lights, "dark_for_s", dark_for_s,
-                     "frames", (json_int_t)weft_rig_stage_frames(r->stage), "resets", (int)counters.resets,
-                     "overruns", (int)counters.overruns, "simulated_s", counters.simulated_s);
+    return json_pack("{s:b, s:s, s:o, s:o, s:f, s:I, s:i, s:i, s:f}", "ok", 1, "sample",
+                     weft_rig_stage_sample(r->stage)->name, "lights_on", list_lamps(lit), "lights_driven",
+                     list_lamps(weft_controller_sim_driven(r->sim)), "dark_for_s", dark_for_s, "frames",
+                     (json_int_t)weft_rig_stage_frames(r->stage), "resets", (int)counters.resets, "overruns",
+                     (int)counters.overruns, "simulated_s", counters.simulated_s);
 }
 
 /* "truth DIR [MM_PER_PX]": the last word is a number or part of the folder's name. */
@@ -149,6 +180,17 @@ static json_t *obey_truth(const rig *r, const char *words)
                      weft_rig_stage_sample(r->stage)->name, "mm_per_px", mm_per_px);
 }
 
+static json_t *obey_board(rig *r, const char *words)
+{
+    weft_error error = {0};
+    bool moved = false;
+    json_t *const reply = weft_rig_board_obey(&r->board, words, &moved);
+    if (!moved || announce(r, false, &error) == WEFT_OK)
+        return reply;
+    json_decref(reply);
+    return reply_error(&error);
+}
+
 static json_t *obey(void *context, const char *line, bool *quit)
 {
     rig *const r = context;
@@ -158,15 +200,15 @@ static json_t *obey(void *context, const char *line, bool *quit)
         const char *name;
         bool wants_more;
     } commands[] = {{"sample", true}, {"truth", true}, {"samples", false}, {"state", false},
-                    {"reset", false}, {"quit", false}, {"dslr", true}};
+                    {"reset", false}, {"quit", false}, {"dslr", true},     {"board", true}};
     int which = -1;
     for (int i = 0; i < (int)(sizeof commands / sizeof commands[0]); i++)
         if (strlen(commands[i].name) == word && strncmp(line, commands[i].name, word) == 0)
             which = i;
     if (which < 0 || commands[which].wants_more != (rest[0] != '\0'))
-        return json_pack(
-            "{s:b, s:s}", "ok", 0, "error",
-            "wanted: sample NAME, samples, state, truth DIR [MM_PER_PX], dslr WORDS, reset or quit");
+        return json_pack("{s:b, s:s}", "ok", 0, "error",
+                         "wanted: sample NAME, samples, state, truth DIR [MM_PER_PX], dslr WORDS, board "
+                         "WORDS, reset or quit");
     switch (which) {
     case 0:
         return obey_sample(r, rest);
@@ -181,6 +223,8 @@ static json_t *obey(void *context, const char *line, bool *quit)
         return json_pack("{s:b}", "ok", 1);
     case 6:
         return weft_dslr_obey(r->dslr, rest);
+    case 7:
+        return obey_board(r, rest);
     default:
         *quit = true;
         return json_pack("{s:b}", "ok", 1);
@@ -267,29 +311,6 @@ static weft_err make_paths(rig *r, weft_error *err)
     return r->json_path && r->socket_path ? WEFT_OK : WEFT_ERR_NOMEM;
 }
 
-static weft_err announce(const rig *r, weft_error *err)
-{
-    char camera[80], dslr[112];
-    const weft_rig_scene *const scene = weft_rig_stage_scene(r->stage);
-    snprintf(camera, sizeof camera, "aravis:%s", r->args->options.address);
-    snprintf(dslr, sizeof dslr, "gphoto:ptpip:%s:%d", r->args->options.address, weft_dslr_port(r->dslr));
-    json_t *const json = json_pack(
-        "{s:s, s:i, s:s, s:s, s:[s,s], s:s, s:i, s:[i,i], s:I, s:s, s:s}", "weft", "rig", "version",
-        RIG_VERSION, "pty", r->pty, "camera", camera, "cameras", camera, dslr, "control", r->socket_path,
-        "pid", (int)getpid(), "size", scene->camera.width, scene->camera.height, "seed",
-        (json_int_t)scene->setup.seed, "firmware", r->firmware, "program", "weft-rig " WEFT_VERSION);
-    if (!json)
-        return weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
-    const weft_err status = weft_json_save(r->json_path, json, err);
-    if (status == WEFT_OK) {
-        json_dumpf(json, stdout, JSON_COMPACT);
-        putchar('\n');
-        fflush(stdout);
-    }
-    json_decref(json);
-    return status;
-}
-
 static weft_err start(rig *r, weft_error *err)
 {
     const weft_rig_options *const options = &r->args->options;
@@ -304,16 +325,18 @@ static weft_err start(rig *r, weft_error *err)
         .firmware = strcmp(r->firmware, "none") == 0 ? NULL : r->firmware,
         .bootloader = options->bootloader,
     };
-    WEFT_TRY(weft_controller_sim_create_with(&program, &r->sim, r->pty, err));
+    WEFT_TRY(weft_controller_sim_create_with(&program, &r->sim, r->board.pty, err));
     WEFT_TRY(weft_rig_camera_create(options->address, options->dir, r->stage, r->sim, &r->camera, err));
     WEFT_TRY(weft_dslr_create(options->address, r->stage, r->sim, &r->dslr, err));
-    return announce(r, err);
+    WEFT_TRY(weft_rig_board_begin(&r->board, r->sim, options->dir, err));
+    return announce(r, true, err);
 }
 
 static void end(rig *r)
 {
     if (r->control && r->json_path)
         (void)remove(r->json_path);
+    weft_rig_board_end(&r->board);
     weft_dslr_destroy(r->dslr);
     weft_rig_camera_destroy(r->camera);
     weft_controller_sim_destroy(r->sim);
