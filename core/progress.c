@@ -1,6 +1,7 @@
 #include "core/progress.h"
 
 #include "core/log.h"
+#include "core/report.h"
 
 #include <signal.h>
 #include <stdio.h>
@@ -41,6 +42,12 @@ void weft_cancel_request(bool yes)
     cancel_requested = yes;
 }
 
+static void report(const weft_progress *p)
+{
+    weft_report_send(json_pack("{s:{s:s, s:s, s:I, s:I}}", "progress", "what", p->what, "unit", p->unit,
+                               "done", (json_int_t)p->done, "total", (json_int_t)p->total));
+}
+
 void weft_progress_begin(weft_progress *p, const char *what, const char *unit, long total)
 {
     const double now = weft_clock_s();
@@ -50,6 +57,8 @@ void weft_progress_begin(weft_progress *p, const char *what, const char *unit, l
                          .started_s = now,
                          .shown_s = now,
                          .terminal = isatty(STDERR_FILENO) != 0};
+    if (weft_report_active())
+        report(p);
 }
 
 static void show(weft_progress *p, double now)
@@ -85,6 +94,13 @@ weft_err weft_progress_step(weft_progress *p, long n, weft_error *err)
         return weft_fail(err, WEFT_ERR_CANCELLED, "%s: cancelled after %ld of %ld %s", p->what, p->done,
                          p->total, p->unit);
     const double now = weft_clock_s();
+    if (weft_report_active()) { /* the listener shows it */
+        if (now - p->shown_s >= 0.1 || p->done == p->total) {
+            report(p);
+            p->shown_s = now;
+        }
+        return WEFT_OK;
+    }
     if (weft_log_get_level() > WEFT_LOG_QUIET && now - p->shown_s >= (p->terminal ? 0.1 : 3.0))
         show(p, now);
     return WEFT_OK;

@@ -3,6 +3,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/report.h"
 #include "core/version.h"
 
 #include <stdlib.h>
@@ -198,6 +199,7 @@ static int run_command(const weft_command *command, int argc, char **argv)
 
 int weft_cli_main(int argc, char **argv)
 {
+    weft_report_open();
     if (argc < 2) {
         print_overview(stderr);
         return weft_err_exit_status(WEFT_ERR_USAGE);
