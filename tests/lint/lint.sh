@@ -40,6 +40,8 @@ layers() {
     wrong host/camera 'host/(cli|capture|solve|light|set|rig)'
     wrong host/solve 'host/(cli|capture|camera|light|rig)'
     wrong host/capture 'host/(cli|solve|rig)'
+    wrong host/library 'host/(cli|daemon|capture|solve|camera|light|rig)'
+    wrong host/daemon 'host/(capture|solve|camera|light|rig)'
     return $bad
 }
 
@@ -51,7 +53,7 @@ unique_names() {
 
 headers_alone() {
     local bad=0 header flags
-    read -ra flags < <(pkg-config --cflags jansson OpenEXR aravis-0.8)
+    read -ra flags < <(pkg-config --cflags jansson OpenEXR aravis-0.8 libmicrohttpd)
     for header in $(git ls-files 'core/*.h' 'calibration/*.h' 'shading/*.h' 'host/*.h' 'firmware/protocol.h'); do
         echo "#include \"$header\"" |
             gcc -std=c17 -D_GNU_SOURCE -Wall -Wextra -Werror -fsyntax-only -I. -Ibuild/generated \

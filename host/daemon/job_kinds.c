@@ -1,0 +1,54 @@
+#include "host/daemon/job_kinds.h"
+
+#include <string.h>
+
+#define CHART .reads = "*", .writes = "output|overlay|patches"
+
+/* clang-format off */
+const weft_job_kind weft_job_kinds[] = {
+    {.command = "devices", .hardware = true, .by_hand = true},
+    {.command = "light on", .hardware = true, .by_hand = true},
+    {.command = "light level", .hardware = true, .by_hand = true},
+    {.command = "light off", .hardware = true, .by_hand = true},
+    {.command = "light run", .hardware = true, .by_hand = true, .reads = "*"},
+    {.command = "light set", .hardware = true, .by_hand = true},
+    {.command = "light status", .hardware = true, .by_hand = true},
+    {.command = "capture", .hardware = true, .resumes = true, .writes = "*", .texts = "lights|exposure|name"},
+    {.command = "calibrate lens", .reads = "*|board-on-table", .writes = "output"},
+    {.command = "calibrate linearity", CHART},
+    {.command = "calibrate white", CHART},
+    {.command = "calibrate lights", .reads = "*|guess", .writes = "output"},
+    {.command = "calibrate colour", CHART, .texts = "chart|edition"},
+    {.command = "import", .reads = "*", .writes = "output|cal"},
+    {.command = "solve", .reads = "*|calibration", .writes = "output", .texts = "method"},
+    {.command = "compare", .reads = "*|mask"},
+    {.command = "preview", .reads = "*", .writes = "output", .texts = "brdf|param"},
+    {.command = "contact", .reads = "*", .writes = "output", .texts = "brdf|param"},
+    {0},
+};
+/* clang-format on */
+
+const weft_job_kind *weft_job_kind_find(const char *command)
+{
+    for (const weft_job_kind *kind = weft_job_kinds; kind->command; kind++)
+        if (strcmp(kind->command, command) == 0)
+            return kind;
+    return NULL;
+}
+
+bool weft_job_kind_lists(const char *list, const char *word)
+{
+    const size_t n = strlen(word);
+    for (const char *p = list; p && *p;) {
+        const size_t length = strcspn(p, "|");
+        if (length == n && memcmp(p, word, n) == 0)
+            return true;
+        p += length + (p[length] == '|');
+    }
+    return false;
+}
+
+bool weft_job_kind_is_device(const char *option)
+{
+    return weft_job_kind_lists("rig|port|camera", option);
+}

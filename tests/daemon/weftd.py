@@ -1,0 +1,230 @@
+"""A daemon under test: its process, requests over its socket, its events.  Used by the tests beside it."""
+import http.client
+import json
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import zlib
+
+BIN = os.environ["WEFT_TEST_BIN"]
+SOURCE = os.environ["WEFT_TEST_SOURCE"]
+SLOW = 5 if "sanitize" in BIN else 1  # sanitizers take their time
+
+
+class UnixConnection(http.client.HTTPConnection):
+    def __init__(self, path, timeout=30):
+        super().__init__("localhost", timeout=timeout)
+        self.path = path
+
+    def connect(self):
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self.path)
+
+
+class Reply:
+    def __init__(self, response):
+        self.status, self.headers, self.bytes = response.status, response.headers, response.read()
+
+    @property
+    def json(self):
+        return json.loads(self.bytes)
+
+
+class Weftd:
+    """`with Weftd(folder) as d`: runs until the block ends; d.kill() and d.start() in between."""
+
+    def __init__(self, folder, *options, env=None):
+        self.folder, self.options, self.process = folder, options, None
+        self.library, self.socket = os.path.join(folder, "library"), os.path.join(folder, "weftd.sock")
+        self.log = os.path.join(folder, "weftd.log")
+        self.env = dict(os.environ, **(env or {}))
+        os.makedirs(self.library, exist_ok=True)
+
+    def start(self):
+        with open(self.log, "ab") as log:
+            self.process = subprocess.Popen(
+                [f"{BIN}/weftd", "--library", self.library, "--socket", self.socket, "--verbose", *self.options],
+                stderr=log, stdout=log, env=self.env)
+        deadline = time.monotonic() + 20 * SLOW
+        while time.monotonic() < deadline:
+            try:
+                self.get("/v1")
+                return self
+            except OSError:
+                if self.process.poll() is not None:
+                    raise AssertionError(f"weftd ended with {self.process.returncode}: {self.words()}")
+                time.sleep(0.02)
+        raise AssertionError("weftd does not answer")
+
+    __enter__ = start
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def words(self):
+        with open(self.log, encoding="utf-8") as log:
+            return log.read()
+
+    def kill(self):
+        self.process.kill()
+        return self.process.wait()
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(timeout=30 * SLOW)
+
+    def request(self, method, path, body=None, headers=None, timeout=30):
+        connection = UnixConnection(self.socket, timeout)
+        sent = dict(headers or {})
+        if isinstance(body, (dict, list)):
+            body = json.dumps(body)
+            sent.setdefault("Content-Type", "application/json")
+        try:
+            connection.request(method, path, body, sent)
+            return Reply(connection.getresponse())
+        finally:
+            connection.close()
+
+    def get(self, path, **more):
+        return self.request("GET", path, **more)
+
+    def post(self, path, body=None, **more):
+        return self.request("POST", path, body, **more)
+
+    def add(self, command, *operands, **options):
+        reply = self.post("/v1/jobs", {"command": command, "operands": list(operands),
+                                       "options": {k.replace("_", "-"): v for k, v in options.items()}})
+        assert reply.status == 201, reply.bytes
+        return reply.json["id"]
+
+    def job(self, number):
+        reply = self.get(f"/v1/jobs/{number}")
+        assert reply.status == 200, reply.bytes
+        return reply.json
+
+    def wait(self, number, *states, timeout=60):
+        states = states or ("done", "failed", "cancelled")
+        deadline = time.monotonic() + timeout * SLOW
+        while time.monotonic() < deadline:
+            job = self.job(number)
+            if job["state"] in states:
+                return job
+            time.sleep(0.02)
+        raise AssertionError(f"job {number} is {job} after {timeout * SLOW} s, wanted {states}")
+
+    def run(self, command, *operands, **options):
+        return self.wait(self.add(command, *operands, **options))
+
+
+class Watcher:
+    """Server-Sent Events, one after the other, as (id, type, data)."""
+
+    def __init__(self, daemon, query="", last=None, timeout=30):
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(timeout)
+        self.sock.connect(daemon.socket)
+        extra = f"Last-Event-ID: {last}\r\n" if last else ""
+        self.sock.sendall(f"GET /v1/events{query} HTTP/1.0\r\nHost: localhost\r\n{extra}\r\n".encode())
+        self.file = self.sock.makefile("rb")
+        self.status = int(self.file.readline().split()[1])
+        while self.file.readline().strip():
+            pass
+
+    def __iter__(self):
+        event = {}
+        for line in self.file:
+            line = line.decode().rstrip("\r\n")
+            if not line and event:
+                yield event.get("id"), event.get("event"), json.loads(event.get("data", "null"))
+                event = {}
+            elif line and not line.startswith(":"):
+                key, _, value = line.partition(": ")
+                event[key] = value
+
+    def until(self, test):
+        seen = []
+        for event in self:
+            seen.append(event)
+            if test(*event):
+                return seen
+        raise AssertionError(f"the events ended after {seen[-3:]}")
+
+    def close(self):
+        self.file.close()
+        self.sock.close()
+
+
+def scratch():
+    """A folder that goes away with the test; short, because sockets have short paths."""
+    folder = tempfile.TemporaryDirectory(prefix="weftd-")
+    return folder
+
+
+def make_flat(folder, width=32, height=24):
+    """A flat matte plate under five lights as 16-bit PNGs with a light-position file: what `weft import` reads."""
+    lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0, -0.6, 0.8)]
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    os.makedirs(folder)
+    with open(f"{folder}/flat.lp", "w", encoding="utf-8") as lp:
+        print(len(lights), file=lp)
+        for i, (x, y, z) in enumerate(lights):
+            rows = (b"\0" + struct.pack(">H", round(65535 * 0.5 * z)) * width) * height
+            with open(f"{folder}/p{i}.png", "wb") as png:
+                png.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0))
+                          + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
+            print(f"p{i}.png {x} {y} {z}", file=lp)
+
+
+def children(pid):
+    """Processes below a process."""
+    found = []
+    for name in os.listdir("/proc"):
+        if not name.isdigit():
+            continue
+        try:
+            with open(f"/proc/{name}/stat", encoding="utf-8") as stat:
+                fields = stat.read().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid and fields[0] != "Z":
+            found.append(int(name))
+            found += children(int(name))
+    return found
+
+
+def alive(pid):
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:
+            return stat.read().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def run_tests(namespace):
+    """Runs every function test_* of a module; prints one line each."""
+    wanted = sys.argv[1:]
+    failed = 0
+    for name, test in list(namespace.items()):
+        if not name.startswith("test_") or (wanted and name not in wanted):
+            continue
+        begin = time.monotonic()
+        try:
+            test()
+            print(f"ok    {name} ({time.monotonic() - begin:.1f} s)")
+        except Exception:  # every test is run
+            import traceback
+            traceback.print_exc()
+            print(f"FAIL  {name}")
+            failed += 1
+        sys.stdout.flush()
+    sys.exit(failed > 0)
