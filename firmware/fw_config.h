@@ -5,7 +5,9 @@
 #define WEFT_FIRMWARE_FW_CONFIG_H
 
 #define FW_VERSION_MAJOR 1
+#ifndef FW_VERSION_MINOR /* a test builds an older one */
 #define FW_VERSION_MINOR 1
+#endif
 #define FW_VERSION_PATCH 0
 
 #define FW_TEXT_(x)      #x

@@ -37,7 +37,7 @@ static bool read_byte(const char *text, uint8_t *byte)
 /* The record of a line of `length` characters; false when it is damaged. */
 static bool parse(const char *line, size_t length, record *r)
 {
-    uint8_t bytes[5 + 255], sum = 0;
+    uint8_t bytes[5 + 255] = {0}, sum = 0;
     const size_t n = length / 2;
     if (length < 11 || length % 2 == 0 || line[0] != ':' || n > sizeof bytes)
         return false;

@@ -197,7 +197,7 @@ weft_err weft_controller_command(weft_controller *c, uint8_t number, const uint8
     if (reply->n < bytes + 1)
         return weft_fail(err, WEFT_ERR_PROTOCOL,
                          "%s: the reply to %s is cut (wanted %d bytes, got %d); flash the firmware of this "
-                         "build, docs/hardware.md says how",
+                         "build (weft flash)",
                          c->serial.name, weft_protocol_command_name(number), bytes + 1, reply->n);
     return WEFT_OK;
 }

@@ -20,11 +20,11 @@ static weft_err nobody_there(const weft_controller *c, weft_error *err)
     if (c->n_bytes == 0)
         return weft_fail(err, WEFT_ERR_TIMEOUT,
                          "%s: nobody answers within %.0f s; is this the light controller, and has it the "
-                         "Weft firmware (docs/hardware.md says how to flash it)?",
+                         "Weft firmware (\"weft flash\" brings it)?",
                          c->serial.name, hello_within_s);
     return weft_fail(err, WEFT_ERR_PROTOCOL,
                      "%s: something answers, but it is no Weft light controller (%zu bytes without sense); "
-                     "try another port, or flash the firmware, docs/hardware.md says how",
+                     "try another port, or flash the firmware (weft flash)",
                      c->serial.name, c->n_bytes);
 }
 
@@ -32,7 +32,7 @@ static weft_err other_version(const weft_controller *c, int major, weft_error *e
 {
     return weft_fail(err, WEFT_ERR_PROTOCOL,
                      "%s: the light controller speaks protocol %d, this program %d; flash the firmware of "
-                     "this build, docs/hardware.md says how",
+                     "this build (weft flash)",
                      c->serial.name, major, WEFT_PROTOCOL_MAJOR);
 }
 
@@ -201,7 +201,7 @@ weft_err weft_controller_open_under(const char *dev, const char *port, int lease
     weft_controller *const c = weft_alloc(1, sizeof *c, err);
     if (!c)
         return WEFT_ERR_NOMEM;
-    c->serial.fd = -1;
+    c->serial.fd = c->serial.reservation = -1;
     c->lease_ms = lease_ms;
     snprintf(c->dev, sizeof c->dev, "%s", dev);
     const bool has_number = strncmp(port, by_number, sizeof by_number - 1) == 0;

@@ -20,8 +20,7 @@ static weft_err check_steps(const weft_controller_info *info, const weft_control
 {
     if (!(info->capabilities & WEFT_CAPABILITY_SEQUENCES))
         return weft_fail(err, WEFT_ERR_UNSUPPORTED,
-                         "%s: firmware %s knows no sequences; flash the firmware of this build, "
-                         "docs/hardware.md says how",
+                         "%s: firmware %s knows no sequences; flash the firmware of this build (weft flash)",
                          info->port, info->firmware);
     if (n < 1 || n > info->max_steps)
         return weft_fail(err, WEFT_ERR_RANGE, "%s: a sequence of %d steps: this controller takes 1 to %d",

@@ -8,8 +8,7 @@ static weft_err check_can(const weft_controller_info *info, weft_error *err)
     if (info->capabilities & WEFT_CAPABILITY_SETTINGS)
         return WEFT_OK;
     return weft_fail(err, WEFT_ERR_UNSUPPORTED,
-                     "%s: firmware %s keeps no settings; flash the firmware of this build, docs/hardware.md "
-                     "says how",
+                     "%s: firmware %s keeps no settings; flash the firmware of this build (weft flash)",
                      info->port, info->firmware);
 }
 

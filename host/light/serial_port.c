@@ -1,6 +1,7 @@
 #include "host/light/serial_port.h"
 
 #include "core/progress.h"
+#include "host/light/port_owner.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -14,6 +15,7 @@
 
 static weft_err why_not_open(const char *port, weft_error *err)
 {
+    weft_port_user user;
     switch (errno) {
     case ENOENT:
     case ENXIO:
@@ -27,8 +29,8 @@ static weft_err why_not_open(const char *port, weft_error *err)
                          "(sudo usermod -aG dialout $USER) and log in again",
                          port);
     case EBUSY:
-        return weft_fail(err, WEFT_ERR_DEVICE, "%s: another program is using this port; close it first",
-                         port);
+        (void)weft_port_find_user(port, &user);
+        return weft_port_fail_used(port, &user, err);
     default:
         return weft_fail_errno(err, WEFT_ERR_DEVICE, "%s: the port cannot be opened", port);
     }
@@ -67,9 +69,14 @@ static int make_raw(int fd, int rate)
 
 weft_err weft_serial_open(weft_serial *serial, const char *port, weft_error *err)
 {
+    serial->fd = -1;
+    WEFT_TRY(weft_port_reserve(port, &serial->reservation, err));
     serial->fd = open(port, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (serial->fd < 0)
-        return why_not_open(port, err);
+    if (serial->fd < 0) {
+        const weft_err failed = why_not_open(port, err);
+        weft_serial_close(serial);
+        return failed;
+    }
     snprintf(serial->name, sizeof serial->name, "%s", port);
     serial->rate = 500000;
     serial->gone = false;
@@ -117,7 +124,9 @@ void weft_serial_close(weft_serial *serial)
             drain(serial->fd);
         close(serial->fd);
     }
-    serial->fd = -1;
+    if (serial->reservation >= 0)
+        close(serial->reservation);
+    serial->fd = serial->reservation = -1;
 }
 
 static weft_err gone(weft_serial *serial, weft_error *err)

@@ -11,10 +11,11 @@
 #include <stdint.h>
 
 typedef struct weft_serial {
-    int fd;         /* -1 when closed */
-    int rate;       /* bits per second */
-    bool gone;      /* the port has vanished */
-    char name[256]; /* for messages */
+    int fd;          /* -1 when closed */
+    int reservation; /* of the port (port_owner.h); -1 when closed */
+    int rate;        /* bits per second */
+    bool gone;       /* the port has vanished */
+    char name[256];  /* for messages */
 } weft_serial;
 
 /** Opens exclusively: 500 000 baud, 8N1, raw, no modem lines, not hanging up on close (that would reset the

@@ -1,0 +1,58 @@
+# Sourced by the tests of weft flash: simulated boards, each a process with a pty, and what they need.
+# shellcheck shell=bash
+# shellcheck disable=SC2034 # used by the scripts
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
+programs=$WEFT_TEST_BUILD/tests/firmware
+optiboot=$programs/optiboot-328p.hex
+old_boot=/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex
+boards=()
+clean() {
+    local b
+    for b in "${boards[@]}"; do kill "$b" 2>/dev/null; done
+    rm -rf "$work"
+}
+trap clean EXIT
+
+die() { echo "FAILED: $*"; exit 1; }
+
+# more words that the last command of `expect` must have printed
+also() { grep -qF -- "$1" out || die "does not say \"$1\": $(cat out)"; }
+
+# board NAME FIRMWARE|none [BOOTLOADER]: sets $pty; `tell NAME WORDS` talks to it
+board() {
+    mkfifo "$1.in"
+    "$WEFT_TEST_BUILD/tests/virtual_controller" "$2" ${3:+"$3"} <"$1.in" >"$1.out" 2>&1 &
+    boards+=($!)
+    exec {fd}>"$1.in"
+    eval "in_$1=$fd"
+    for _ in $(seq 100); do
+        [ -s "$1.out" ] && break
+        sleep 0.02
+    done
+    read -r pty <"$1.out"
+    [ -c "$pty" ] || die "no board $1: $(cat "$1.out")"
+}
+tell() {
+    local name=in_$1
+    shift
+    echo "$@" >&"${!name}"
+}
+
+# starts flashing $pty in the background and waits until avrdude writes
+flash_until_writing() {
+    "$weft" flash --port "$pty" -v >flash.out 2>flash.err &
+    flasher=$!
+    for _ in $(seq 600); do
+        grep -q 'avrdude: writing' flash.err && return
+        kill -0 "$flasher" 2>/dev/null || die "ended before it wrote: $(cat flash.err)"
+        sleep 0.02
+    done
+    die "does not begin to write: $(cat flash.err)"
+}
+# ended STATUS WORDS: how that flashing ended
+ended() {
+    local status=0
+    wait "$flasher" || status=$?
+    [ $status = "$1" ] || die "flashing ended with $status, wanted $1: $(cat flash.out flash.err)"
+    grep -qF -- "$2" flash.out flash.err || die "does not say \"$2\": $(cat flash.out flash.err)"
+}
