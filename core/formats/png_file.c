@@ -280,3 +280,31 @@ weft_err weft_png_write_mask(const char *path, const weft_mask *mask, weft_error
     weft_raster_fini(&raster);
     return status;
 }
+
+weft_err weft_png_read_bytes(const char *path, weft_mask *bytes, weft_error *err)
+{
+    weft_raster raster;
+    WEFT_TRY(weft_png_read(path, &raster, err));
+    weft_err status = WEFT_OK;
+    if (raster.channels != 1 || raster.bits != 8)
+        status = weft_fail(err, WEFT_ERR_FORMAT, "%s: has %d channels of %d bits, wanted one of 8", path,
+                           raster.channels, raster.bits);
+    if (status == WEFT_OK)
+        status = weft_mask_init(bytes, raster.width, raster.height, 0, err);
+    for (size_t i = 0; status == WEFT_OK && i < (size_t)raster.width * (size_t)raster.height; i++)
+        bytes->data[i] = (uint8_t)raster.data[i];
+    weft_raster_fini(&raster);
+    return status;
+}
+
+weft_err weft_png_write_bytes(const char *path, const weft_mask *bytes, weft_error *err)
+{
+    weft_raster raster;
+    WEFT_TRY(weft_raster_init(&raster, bytes->width, bytes->height, 1, 8, err));
+    const size_t n = (size_t)bytes->width * (size_t)bytes->height;
+    for (size_t i = 0; i < n; i++)
+        raster.data[i] = bytes->data[i];
+    const weft_err status = weft_png_write(path, &raster, err);
+    weft_raster_fini(&raster);
+    return status;
+}

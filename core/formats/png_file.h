@@ -18,4 +18,9 @@ weft_err weft_png_read_mask(const char *path, weft_mask *mask, weft_error *err);
 /** Writes a mask as 8-bit grey 0 / 255. */
 weft_err weft_png_write_mask(const char *path, const weft_mask *mask, weft_error *err);
 
+/** As masks, but the bytes themselves: numbers and bits, one channel of 8 bits.
+ *  @return WEFT_ERR_FORMAT from reading when the picture is of another kind */
+weft_err weft_png_read_bytes(const char *path, weft_mask *bytes, weft_error *err);
+weft_err weft_png_write_bytes(const char *path, const weft_mask *bytes, weft_error *err);
+
 #endif

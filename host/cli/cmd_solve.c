@@ -12,12 +12,13 @@
 
 typedef struct solve_args {
     const char *calibration, *output, *method;
-    int geometry, resolution;
+    int geometry, resolution, gloss;
     double mm_per_px, thickness_mm, shadow;
 } solve_args;
 
 enum { GEOMETRY_AUTO, GEOMETRY_PLANE, GEOMETRY_SENSOR };
 enum { RESOLUTION_FULL, RESOLUTION_HALF };
+enum { GLOSS_AUTO, GLOSS_OFF };
 
 static const weft_field fields[] = {
     {.key = "calibration",
@@ -38,7 +39,7 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(solve_args, method),
      .unit = "NAME",
-     .def = "lsq",
+     .def = "robust",
      .help = "how a pixel's samples become a normal; a wrong name lists them"},
     {.key = "geometry",
      .type = WEFT_FIELD_CHOICE,
@@ -52,6 +53,12 @@ static const weft_field fields[] = {
      .choices = "full|half",
      .def = "full",
      .help = "full: every photosite by its own colour; half: a pixel per 2x2 cell"},
+    {.key = "gloss",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(solve_args, gloss),
+     .choices = "auto|off",
+     .def = "auto",
+     .help = "auto: the robust method looks for the cloth's mirror light; off: every cloth is matte"},
     {.key = "mm-per-px",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, mm_per_px),
@@ -217,6 +224,7 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
     weft_solve_options options = {.sensor_geometry = args->geometry == GEOMETRY_SENSOR,
                                   .plane_geometry = args->geometry == GEOMETRY_PLANE,
                                   .half = args->resolution == RESOLUTION_HALF,
+                                  .matte = args->gloss == GLOSS_OFF,
                                   .mm_per_px = args->mm_per_px,
                                   .height_mm = args->thickness_mm,
                                   .shadow = args->shadow};
@@ -252,9 +260,10 @@ const weft_command weft_cmd_solve = {
     .max_operands = -1,
     .args_size = sizeof(solve_args),
     .fields = fields,
-    .details = "Fits a matte surface to what each light did to each pixel (docs/solving.md).\n"
+    .details = "Finds normal and albedo of each pixel from what each light did to it (docs/solving.md).\n"
                "Needs a set with all lights and a calibration with lights, and for near lights the\n"
-               "camera and its pose.  Writes normal, albedo, residual, confidence and mask.",
+               "camera and its pose.  Writes normal, albedo, residual, confidence,\n"
+               "uncertainty, lights used, quality and mask.",
     .example = "weft solve twill.set -c scanner.cal -o twill.maps",
     .run = run,
 };

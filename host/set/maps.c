@@ -24,6 +24,9 @@ void weft_maps_fini(weft_maps *maps)
     weft_image_fini(&maps->albedo);
     weft_image_fini(&maps->residual);
     weft_image_fini(&maps->confidence);
+    weft_image_fini(&maps->uncertainty);
+    weft_mask_fini(&maps->lights);
+    weft_mask_fini(&maps->quality);
     weft_mask_fini(&maps->mask);
     json_decref(maps->info);
     *maps = (weft_maps){0};
@@ -43,6 +46,15 @@ static weft_err check_image(const char *folder, const char *what, const weft_ima
     return WEFT_OK;
 }
 
+static weft_err check_mask(const char *folder, const char *what, const weft_mask *mask, const weft_maps *maps,
+                           weft_error *err)
+{
+    if (mask->data && (mask->width != maps->width || mask->height != maps->height))
+        return weft_fail(err, WEFT_ERR_MISMATCH, "%s: the %s is %d x %d, wanted %d x %d", folder, what,
+                         mask->width, mask->height, maps->width, maps->height);
+    return WEFT_OK;
+}
+
 static weft_err check_maps(const char *folder, const weft_maps *maps, weft_error *err)
 {
     if (maps->normal.planes == 0 && maps->albedo.planes == 0)
@@ -52,9 +64,10 @@ static weft_err check_maps(const char *folder, const weft_maps *maps, weft_error
     WEFT_TRY(check_image(folder, "albedo", &maps->albedo, 3, maps, err));
     WEFT_TRY(check_image(folder, "residual", &maps->residual, 1, maps, err));
     WEFT_TRY(check_image(folder, "confidence", &maps->confidence, 1, maps, err));
-    if (maps->mask.data && (maps->mask.width != maps->width || maps->mask.height != maps->height))
-        return weft_fail(err, WEFT_ERR_MISMATCH, "%s: the mask is %d x %d, wanted %d x %d", folder,
-                         maps->mask.width, maps->mask.height, maps->width, maps->height);
+    WEFT_TRY(check_image(folder, "uncertainty", &maps->uncertainty, 1, maps, err));
+    WEFT_TRY(check_mask(folder, "map of lights used", &maps->lights, maps, err));
+    WEFT_TRY(check_mask(folder, "quality map", &maps->quality, maps, err));
+    WEFT_TRY(check_mask(folder, "mask", &maps->mask, maps, err));
     if (maps->geometry == WEFT_GEOMETRY_PLANE && !(maps->mm_per_px > 0 && isfinite(maps->mm_per_px)))
         return weft_fail(err, WEFT_ERR_RANGE, "%s: %g mm per pixel is not possible", folder, maps->mm_per_px);
     return WEFT_OK;
@@ -127,6 +140,21 @@ static weft_err write_confidence_exr(const char *path, const weft_maps *maps, we
     return weft_exr_write(path, &maps->confidence, grey_names, WEFT_EXR_HALF, err);
 }
 
+static weft_err write_uncertainty_exr(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_exr_write(path, &maps->uncertainty, grey_names, WEFT_EXR_HALF, err);
+}
+
+static weft_err write_lights_png(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_png_write_bytes(path, &maps->lights, err);
+}
+
+static weft_err write_quality_png(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_png_write_bytes(path, &maps->quality, err);
+}
+
 static weft_err write_mask_png(const char *path, const weft_maps *maps, weft_error *err)
 {
     return weft_png_write_mask(path, &maps->mask, err);
@@ -155,6 +183,9 @@ static weft_err write_all(const char *folder, const weft_maps *maps, weft_error 
         {albedo, "albedo.png", write_albedo_view},
         {maps->residual.planes != 0, "residual.exr", write_residual_exr},
         {maps->confidence.planes != 0, "confidence.exr", write_confidence_exr},
+        {maps->uncertainty.planes != 0, "uncertainty.exr", write_uncertainty_exr},
+        {maps->lights.data != NULL, "lights.png", write_lights_png},
+        {maps->quality.data != NULL, "quality.png", write_quality_png},
         {maps->mask.data != NULL, "mask.png", write_mask_png},
         {true, "maps.json", write_json},
     };
@@ -247,16 +278,19 @@ static weft_err read_map(const char *folder, const char *name, const char *const
     return status;
 }
 
-static weft_err read_mask(const char *folder, weft_maps *maps, weft_error *err)
+typedef weft_err read_mask_fn(const char *path, weft_mask *mask, weft_error *err);
+
+static weft_err read_mask(const char *folder, const char *name, read_mask_fn *read, weft_maps *maps,
+                          weft_mask *mask, weft_error *err)
 {
-    char *const path = weft_path_join(folder, "mask.png", err);
+    char *const path = weft_path_join(folder, name, err);
     if (!path)
         return WEFT_ERR_NOMEM;
     weft_err status = WEFT_OK;
     if (weft_file_exists(path)) {
-        status = weft_png_read_mask(path, &maps->mask, err);
+        status = read(path, mask, err);
         if (status == WEFT_OK)
-            status = agree(maps, path, maps->mask.width, maps->mask.height, err);
+            status = agree(maps, path, mask->width, mask->height, err);
     }
     weft_free(path);
     return status;
@@ -304,7 +338,10 @@ static weft_err load_into(const char *folder, weft_maps *maps, weft_error *err)
                          folder);
     WEFT_TRY(read_map(folder, "residual.exr", grey_names, 1, maps, &maps->residual, err));
     WEFT_TRY(read_map(folder, "confidence.exr", grey_names, 1, maps, &maps->confidence, err));
-    WEFT_TRY(read_mask(folder, maps, err));
+    WEFT_TRY(read_map(folder, "uncertainty.exr", grey_names, 1, maps, &maps->uncertainty, err));
+    WEFT_TRY(read_mask(folder, "lights.png", weft_png_read_bytes, maps, &maps->lights, err));
+    WEFT_TRY(read_mask(folder, "quality.png", weft_png_read_bytes, maps, &maps->quality, err));
+    WEFT_TRY(read_mask(folder, "mask.png", weft_png_read_mask, maps, &maps->mask, err));
     return maps->normal.planes ? tidy_normals(maps, err) : WEFT_OK;
 }
 

@@ -102,6 +102,19 @@ static void copy_lights(weft_incidence *to, const weft_calibration *cal)
     }
 }
 
+/* The world point that the camera's frame puts at its origin: -R^T t. */
+static void place_eye(weft_incidence *to, const weft_calibration *cal)
+{
+    to->has_eye = cal->has_camera && cal->camera.has_pose;
+    if (!to->has_eye)
+        return;
+    const weft_mat3 back = weft_mat3_transpose(&cal->camera.rotation);
+    const weft_vec3 eye = weft_scale(weft_mat3_apply(&back, cal->camera.translation), -1);
+    to->eye[0] = (float)eye.x;
+    to->eye[1] = (float)eye.y;
+    to->eye[2] = (float)eye.z;
+}
+
 static bool any_near(const weft_calibration *cal)
 {
     for (int j = 0; j < cal->n_lights; j++)
@@ -128,6 +141,7 @@ weft_err weft_incidence_init(weft_incidence *incidence, const weft_calibration *
     if (!to.nodes)
         return WEFT_ERR_NOMEM;
     copy_lights(&to, cal);
+    place_eye(&to, cal);
     weft_parallel_rows(to.rows, fill_rows, &l);
     *incidence = to;
     return WEFT_OK;

@@ -20,6 +20,8 @@ typedef struct weft_incidence {
     int columns, rows; /* of nodes; they reach past the last pixel to a whole block of 16 */
     int stride;        /* floats from node to node, a multiple of 16 */
     float height_mm;   /* of the surface over the sample plane */
+    bool has_eye;      /* false: the camera is far away over the plane */
+    float eye[3];      /* the camera's centre, mm */
     bool distant[WEFT_LIGHTS_MAX];
     float light[WEFT_LIGHTS_MAX][3]; /* position in mm, or unit direction when distant */
     /* [rows][columns][stride]; NaN where a ray misses the plane or a light does not shine */

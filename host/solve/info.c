@@ -6,6 +6,8 @@
 #include "core/sha256.h"
 #include "core/version.h"
 
+#include <math.h>
+
 static weft_err hash_into(json_t *object, const char *folder, const char *name, weft_error *err)
 {
     char hex[65];
@@ -49,31 +51,44 @@ static weft_err inputs(const weft_set *set, const char *cal_folder, json_t *to, 
 
 static json_t *options_json(const weft_solve_options *o, const weft_maps *maps)
 {
-    const weft_solve_method *const method = o->method ? o->method : weft_solve_methods;
-    return json_pack("{s:s, s:s, s:s, s:f, s:f}", "method", method->name, "geometry",
+    const weft_solve_method *const method = o->method ? o->method : weft_solve_methods[0];
+    return json_pack("{s:s, s:s, s:s, s:f, s:f, s:s}", "method", method->name, "geometry",
                      maps->geometry == WEFT_GEOMETRY_PLANE ? "plane" : "sensor", "resolution",
-                     o->half ? "half" : "full", "thickness_mm", o->height_mm, "shadow", o->shadow);
+                     o->half ? "half" : "full", "thickness_mm", o->height_mm, "shadow", o->shadow, "gloss",
+                     o->matte ? "off" : "auto");
 }
 
-static json_t *result_json(const weft_maps *maps)
+static json_t *gloss_json(const weft_gloss *g)
+{
+    return json_pack("{s:f, s:f, s:f, s:f}", "strength", (double)g->strength, "alpha_along",
+                     (double)g->alpha_along, "alpha_across", (double)g->alpha_across, "fibre_deg",
+                     57.29577951308232 * atan2((double)g->fibre[0][1], (double)g->fibre[0][0]));
+}
+
+static json_t *result_json(const weft_maps *maps, const weft_solve_run *run)
 {
     const size_t n = (size_t)maps->width * (size_t)maps->height;
     size_t answered = 0;
-    double residual = 0, confidence = 0;
+    double residual = 0, confidence = 0, uncertainty = 0;
     for (size_t i = 0; i < n; i++)
         if (maps->mask.data[i]) {
             answered++;
             residual += (double)maps->residual.data[i];
             confidence += (double)maps->confidence.data[i];
+            uncertainty += (double)maps->uncertainty.data[i];
         }
     const double count = answered ? (double)answered : 1;
-    return json_pack("{s:i, s:i, s:I, s:f, s:f}", "width", maps->width, "height", maps->height, "answered_px",
-                     (json_int_t)answered, "residual_mean", residual / count, "confidence_mean",
-                     confidence / count);
+    json_t *const result =
+        json_pack("{s:i, s:i, s:I, s:f, s:f, s:f}", "width", maps->width, "height", maps->height,
+                  "answered_px", (json_int_t)answered, "residual_mean", residual / count, "confidence_mean",
+                  confidence / count, "uncertainty_deg_mean", uncertainty / count);
+    if (result && run->report.found)
+        json_object_set_new(result, "gloss", gloss_json(&run->gloss));
+    return result;
 }
 
 weft_err weft_solve_describe(const weft_set *set, const char *cal_folder, const weft_solve_options *options,
-                             const weft_solve_seconds *seconds, weft_maps *maps, weft_error *err)
+                             const weft_solve_run *run, weft_maps *maps, weft_error *err)
 {
     json_t *const info = json_object(), *const from = json_object();
     weft_err status = WEFT_OK;
@@ -82,10 +97,10 @@ weft_err weft_solve_describe(const weft_set *set, const char *cal_folder, const 
     if (info && from)
         status = inputs(set, cal_folder, from, err);
     json_object_set_new(info, "options", options_json(options, maps));
-    json_object_set_new(info, "result", result_json(maps));
+    json_object_set_new(info, "result", result_json(maps, run));
     if (json_object_set_new(info, "seconds",
-                            json_pack("{s:f, s:f, s:f}", "read", seconds->read, "solve", seconds->solve,
-                                      "rectify", seconds->rectify)) != 0 &&
+                            json_pack("{s:f, s:f, s:f}", "read", run->seconds.read, "solve",
+                                      run->seconds.solve, "rectify", run->seconds.rectify)) != 0 &&
         status == WEFT_OK)
         status = weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the description of the maps");
     if (status != WEFT_OK)

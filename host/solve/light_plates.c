@@ -34,6 +34,15 @@ static double saturation_limit(const weft_set *set, int light)
     return n == 1 && set->cfa != WEFT_CFA_NONE ? limit : 0;
 }
 
+static double light_time(const weft_set *set, int light)
+{
+    double time = 0;
+    for (int i = 0; i < set->n_frames; i++)
+        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light)
+            time += set->frames[i].exposure_s * set->frames[i].gain;
+    return time;
+}
+
 static weft_err load_light(const weft_set *set, int light, const weft_plate *ambient, bool half,
                            weft_plate *plate, weft_error *err)
 {
@@ -57,6 +66,7 @@ weft_err weft_light_plates_load(const weft_set *set, bool half, weft_light_plate
     while (p->n < n && status == WEFT_OK) {
         weft_plate *const plate = &p->plate[p->n];
         p->most[p->n] = saturation_limit(set, p->n);
+        p->time[p->n] = light_time(set, p->n);
         p->n++; /* a plate that fails half way is freed with the others */
         status = load_light(set, p->n - 1, present ? &ambient : NULL, half, plate, err);
         if (status == WEFT_OK)
@@ -87,5 +97,7 @@ void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_
         in[j].clipped = p->clipped.data ? p->clipped.data + (size_t)row * (size_t)p->clipped.width : NULL;
         in[j].least = (float)(3 * p->noise_floor);
         in[j].most = (float)plates->most[j];
+        in[j].read = (float)(p->noise_floor * p->noise_floor);
+        in[j].shot = (float)(plates->noise.shot / plates->time[j]);
     }
 }

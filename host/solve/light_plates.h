@@ -2,6 +2,7 @@
 #ifndef WEFT_HOST_SOLVE_LIGHT_PLATES_H
 #define WEFT_HOST_SOLVE_LIGHT_PLATES_H
 
+#include "host/set/noise.h"
 #include "host/set/plate.h"
 #include "host/solve/solve_row.h"
 
@@ -9,6 +10,8 @@ typedef struct weft_light_plates {
     int n, width, height; /* at solving size */
     weft_cfa cfa;         /* of mosaics at full size; NONE for grey and RGB, and at half size */
     weft_plate plate[WEFT_LIGHTS_MAX];
+    weft_noise noise;             /* of a frame, as parts of full scale; {0}: not known */
+    double time[WEFT_LIGHTS_MAX]; /* exposure times gain, s: of all frames of a bracket */
     double most[WEFT_LIGHTS_MAX]; /* 98 % of saturation as linear value; 0 for brackets and pictures */
 } weft_light_plates;
 

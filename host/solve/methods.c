@@ -1,6 +1,8 @@
 #include "host/solve/samples.h"
 
-const weft_solve_method weft_solve_methods[] = {
-    {.name = "lsq", .summary = "least squares over every usable sample", .solve = weft_solve_lsq},
-    {0},
+const weft_solve_method *const weft_solve_methods[] = {
+    &weft_method_robust,
+    &weft_method_lsq,
+    &weft_method_svd,
+    NULL,
 };

@@ -197,7 +197,7 @@ static float near_value(const weft_image *image, int plane, int u0, int v0, cons
 
 /* One pixel of the grid that lies at (u, v) among the solved pixels. */
 static bool resample(const rectify_job *job, double u, double v, float normal_albedo[PLANES],
-                     float quality[2])
+                     float quality[3], size_t *nearest)
 {
     const weft_maps *const s = job->sensor;
     int u0, v0;
@@ -206,6 +206,11 @@ static bool resample(const rectify_job *job, double u, double v, float normal_al
         return false;
     quality[0] = near_value(&s->residual, 0, u0, v0, near);
     quality[1] = near_value(&s->confidence, 0, u0, v0, near);
+    quality[2] = s->uncertainty.planes ? near_value(&s->uncertainty, 0, u0, v0, near) : 0;
+    int most = 0;
+    for (int i = 1; i < 4; i++)
+        most = near[i] > near[most] ? i : most;
+    *nearest = (size_t)(v0 + most / 2) * (size_t)s->mask.width + (size_t)(u0 + most % 2);
     const taps x = make_taps(job, u), y = make_taps(job, v);
     const bool whole = all_answered(&s->mask, &x, &y);
     for (int p = 0; p < PLANES; p++) {
@@ -234,27 +239,42 @@ static void rectify_rows(void *context, int band, int row_begin, int row_end)
             const weft_vec3 point = {(i - 0.5 * (g->width - 1)) * g->mm_per_px,
                                      (0.5 * (g->height - 1) - j) * g->mm_per_px, g->height_mm};
             double u, v;
-            float value[PLANES], quality[2];
+            float value[PLANES], quality[3];
+            size_t nearest;
             if (!weft_camera_project(job->camera, point, &u, &v) ||
                 !resample(job, (u - job->pixel.offset) / job->pixel.scale,
-                          (v - job->pixel.offset) / job->pixel.scale, value, quality))
+                          (v - job->pixel.offset) / job->pixel.scale, value, quality, &nearest))
                 continue;
+            const size_t at = (size_t)j * (size_t)g->width + (size_t)i;
             for (int p = 0; p < 3; p++) {
                 weft_image_row(&to->normal, p, j)[i] = value[p];
                 weft_image_row(&to->albedo, p, j)[i] = value[3 + p];
             }
             weft_image_row(&to->residual, 0, j)[i] = quality[0];
             weft_image_row(&to->confidence, 0, j)[i] = quality[1];
-            to->mask.data[(size_t)j * (size_t)g->width + (size_t)i] = 255;
+            if (to->uncertainty.planes)
+                weft_image_row(&to->uncertainty, 0, j)[i] = quality[2];
+            if (to->lights.data)
+                to->lights.data[at] = job->sensor->lights.data[nearest];
+            if (to->quality.data)
+                to->quality.data[at] = job->sensor->quality.data[nearest];
+            to->mask.data[at] = 255;
         }
 }
 
-static weft_err make_images(weft_maps *maps, int width, int height, weft_error *err)
+/* The maps that `sensor` has. */
+static weft_err make_images(weft_maps *maps, const weft_maps *sensor, int width, int height, weft_error *err)
 {
     WEFT_TRY(weft_image_init(&maps->normal, width, height, 3, err));
     WEFT_TRY(weft_image_init(&maps->albedo, width, height, 3, err));
     WEFT_TRY(weft_image_init(&maps->residual, width, height, 1, err));
     WEFT_TRY(weft_image_init(&maps->confidence, width, height, 1, err));
+    if (sensor->uncertainty.planes)
+        WEFT_TRY(weft_image_init(&maps->uncertainty, width, height, 1, err));
+    if (sensor->lights.data)
+        WEFT_TRY(weft_mask_init(&maps->lights, width, height, 0, err));
+    if (sensor->quality.data)
+        WEFT_TRY(weft_mask_init(&maps->quality, width, height, 0, err));
     return weft_mask_init(&maps->mask, width, height, 0, err);
 }
 
@@ -280,7 +300,7 @@ weft_err weft_rectify(const weft_maps *sensor, const weft_camera *camera, weft_p
         .origin_mm = {-0.5 * (grid->width - 1) * grid->mm_per_px, 0.5 * (grid->height - 1) * grid->mm_per_px},
         .albedo_is_srgb = sensor->albedo_is_srgb};
     job.plane = &to;
-    weft_err status = make_images(&to, grid->width, grid->height, err);
+    weft_err status = make_images(&to, sensor, grid->width, grid->height, err);
     if (status == WEFT_OK)
         status = weft_parallel_rows_progress(grid->height, rectify_rows, &job, "rectifying", err);
     if (status == WEFT_OK)

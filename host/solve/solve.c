@@ -4,19 +4,22 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "host/solve/albedo_gamut.h"
+#include "host/solve/cloth_gloss.h"
 #include "host/solve/info.h"
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
 #include "host/solve/site_albedo.h"
 #include "host/solve/solve_row.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 weft_err weft_solve_find_method(const char *name, const weft_solve_method **method, weft_error *err)
 {
     char known[256] = "";
-    for (const weft_solve_method *m = weft_solve_methods; m->name; m++) {
+    for (int i = 0; weft_solve_methods[i]; i++) {
+        const weft_solve_method *const m = weft_solve_methods[i];
         if (strcmp(m->name, name) == 0) {
             *method = m;
             return WEFT_OK;
@@ -70,10 +73,14 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
     weft_maps *const m = job->maps;
     (void)band;
     for (int row = row_begin; row < row_end; row++) {
+        const size_t at = (size_t)row * (size_t)m->width;
         weft_solve_row_in in[WEFT_LIGHTS_MAX];
         weft_solve_row_out out = {.residual = weft_image_row(&m->residual, 0, row),
                                   .confidence = weft_image_row(&m->confidence, 0, row),
-                                  .valid = m->mask.data + (size_t)row * (size_t)m->width};
+                                  .angle = weft_image_row(&m->uncertainty, 0, row),
+                                  .lights = m->lights.data + at,
+                                  .quality = m->quality.data + at,
+                                  .valid = m->mask.data + at};
         for (int c = 0; c < 3; c++) {
             out.normal[c] = weft_image_row(&m->normal, c, row);
             out.albedo[c] = weft_image_row(&m->albedo, c, row);
@@ -82,6 +89,8 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
         weft_solve_row(job->plan, row, in, &out);
     }
 }
+
+static const float degrees = 57.2957795F;
 
 /* Colour, and nothing where the set's mask or the solver has no answer. */
 static void finish_rows(void *context, int band, int row_begin, int row_end)
@@ -99,11 +108,15 @@ static void finish_rows(void *context, int band, int row_begin, int row_end)
         for (int i = 0; i < m->width; i++) {
             if (job->inside->data && !job->inside->data[at + (size_t)i])
                 answered[i] = 0;
-            if (answered[i])
+            if (answered[i]) {
+                weft_image_row(&m->uncertainty, 0, row)[i] *= degrees;
                 continue;
+            }
             for (int c = 0; c < 3; c++)
                 weft_image_row(&m->normal, c, row)[i] = rgb[c][i] = 0;
             weft_image_row(&m->residual, 0, row)[i] = weft_image_row(&m->confidence, 0, row)[i] = 0;
+            weft_image_row(&m->uncertainty, 0, row)[i] = 0;
+            m->lights.data[at + (size_t)i] = 0;
         }
     }
 }
@@ -155,13 +168,29 @@ static weft_err make_maps(weft_maps *maps, int width, int height, weft_error *er
     WEFT_TRY(weft_image_init(&maps->albedo, width, height, 3, err));
     WEFT_TRY(weft_image_init(&maps->residual, width, height, 1, err));
     WEFT_TRY(weft_image_init(&maps->confidence, width, height, 1, err));
+    WEFT_TRY(weft_image_init(&maps->uncertainty, width, height, 1, err));
+    WEFT_TRY(weft_mask_init(&maps->lights, width, height, 0, err));
+    WEFT_TRY(weft_mask_init(&maps->quality, width, height, 0, err));
     return weft_mask_init(&maps->mask, width, height, 0, err);
+}
+
+static void explain_gloss(const weft_gloss_report *report, const weft_gloss *gloss)
+{
+    if (report->n_pixels > 0)
+        weft_explain("gloss: chi^2 of %d pixels %.3f matte, %.3f with a lobe%s", report->n_pixels,
+                     report->matte, report->glossy, report->found ? "" : ": taken as matte");
+    if (gloss)
+        weft_explain(
+            "gloss: strength %.4f, alpha %.3f along and %.3f across the fibres, which run %.1f degrees "
+            "from +x or across that",
+            (double)gloss->strength, (double)gloss->alpha_along, (double)gloss->alpha_across,
+            57.29577951308232 * atan2((double)gloss->fibre[0][1], (double)gloss->fibre[0][0]));
 }
 
 /* All at sensor geometry. */
 static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal,
                                 const weft_solve_options *options, weft_pixel_scale pixel, weft_maps *maps,
-                                weft_solve_seconds *seconds, weft_error *err)
+                                weft_solve_run *run, weft_error *err)
 {
     weft_light_plates plates = {0};
     weft_mask inside = {0};
@@ -170,7 +199,7 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     weft_err status = load_mask(set, options->half, &inside, err);
     if (status == WEFT_OK)
         status = weft_light_plates_load(set, options->half, &plates, err);
-    seconds->read = weft_clock_s() - clock;
+    run->seconds.read = weft_clock_s() - clock;
     clock = weft_clock_s();
     if (status == WEFT_OK)
         status =
@@ -178,13 +207,21 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     if (status == WEFT_OK)
         status = make_maps(maps, plates.width, plates.height, err);
     if (status == WEFT_OK) {
-        const weft_solve_method *const method = options->method ? options->method : weft_solve_methods;
-        const weft_solve_plan plan = {&incidence, method->solve, plates.width, plates.cfa,
-                                      (float)options->shadow};
+        weft_solve_plan plan = {.incidence = &incidence,
+                                .method = options->method ? options->method : weft_solve_methods[0],
+                                .width = plates.width,
+                                .cfa = plates.cfa,
+                                .shadow = (float)options->shadow};
+        if (plan.method->takes_gloss && !options->matte)
+            status = weft_cloth_gloss(&plan, &plates, &inside, &run->gloss, &run->report, err);
+        if (run->report.found)
+            plan.gloss = &run->gloss;
+        explain_gloss(&run->report, plan.gloss);
         solve_job job = {&plan, &plates, &inside, cal, maps};
-        status = solve_all_rows(&job, err);
+        if (status == WEFT_OK)
+            status = solve_all_rows(&job, err);
     }
-    seconds->solve = weft_clock_s() - clock;
+    run->seconds.solve = weft_clock_s() - clock;
     weft_incidence_fini(&incidence);
     weft_mask_fini(&inside);
     weft_light_plates_fini(&plates);
@@ -222,22 +259,22 @@ weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const 
                         const weft_solve_options *options, weft_maps *maps, weft_error *err)
 {
     const weft_pixel_scale pixel = options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
-    weft_solve_seconds seconds = {0};
+    weft_solve_run run = {0};
     weft_maps to = {0};
     WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
     const bool pose = cal->has_camera && cal->camera.has_pose;
     if (!pose && !options->sensor_geometry)
         weft_note("%s has no camera: the maps stay in sensor geometry", cal_folder);
-    weft_err status = solve_on_sensor(set, cal, options, pixel, &to, &seconds, err);
+    weft_err status = solve_on_sensor(set, cal, options, pixel, &to, &run, err);
     if (status == WEFT_OK)
         status = require_an_answer(&to, set, err);
     if (status == WEFT_OK && pose && !options->sensor_geometry) {
         const double clock = weft_clock_s();
         status = put_on_plane(&to, cal, options, pixel, err);
-        seconds.rectify = weft_clock_s() - clock;
+        run.seconds.rectify = weft_clock_s() - clock;
     }
     if (status == WEFT_OK)
-        status = weft_solve_describe(set, cal_folder, options, &seconds, &to, err);
+        status = weft_solve_describe(set, cal_folder, options, &run, &to, err);
     if (status == WEFT_OK)
         status = weft_albedo_gamut_note(cal, &to, err);
     if (status != WEFT_OK) {

@@ -58,6 +58,21 @@ WEFT_INLINE void point_at_light(const weft_incidence *inc, int j, const float x[
     }
 }
 
+WEFT_INLINE void point_at_eye(const weft_incidence *inc, const float x[LANES], const float y[LANES],
+                              weft_solve_samples *s)
+{
+    const float z = inc->height_mm;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        const float dx = inc->has_eye ? inc->eye[0] - x[k] : 0.0F,
+                    dy = inc->has_eye ? inc->eye[1] - y[k] : 0.0F, dz = inc->has_eye ? inc->eye[2] - z : 1.0F;
+        const float inverse = 1 / sqrtf(dx * dx + dy * dy + dz * dz);
+        s->view[0][k] = dx * inverse;
+        s->view[1][k] = dy * inverse;
+        s->view[2][k] = dz * inverse;
+    }
+}
+
 WEFT_INLINE void read_colours(const block_nodes *nodes, int step_log2, int j, const weft_solve_row_in *in,
                               int first, weft_solve_samples *s)
 {
@@ -72,7 +87,14 @@ WEFT_INLINE void read_colours(const block_nodes *nodes, int step_log2, int j, co
         const float r = red[k] * scale[0][k], g = green[k] * scale[1][k], b = blue[k] * scale[2][k];
         const float rg = red[k] > green[k] ? red[k] : green[k], most = rg > blue[k] ? rg : blue[k];
         const int finite = fabsf(r) + fabsf(g) + fabsf(b) < 1e30F; /* false for NaN */
-        const int use = finite & (most >= in->least) & (most <= limit);
+        const int dark = most<in->least, clipped = most> limit;
+        const int use = finite & !dark & !clipped;
+        const float wr = 0.2126F * scale[0][k], wg = 0.7152F * scale[1][k], wb = 0.0722F * scale[2][k];
+        const float shot = 0.2126F * wr * r + 0.7152F * wg * g + 0.0722F * wb * b;
+        const float variance = in->read * (wr * wr + wg * wg + wb * wb) + in->shot * (shot > 0 ? shot : 0.0F);
+        s->at[j].variance[k] = use ? variance : 0.0F;
+        s->dark[k] += dark ? 1.0F : 0.0F;
+        s->clipped[k] += clipped ? 1.0F : 0.0F;
         s->at[j].weight[k] = use ? 1.0F : 0.0F;
         s->at[j].value[0][k] = use ? r : 0.0F;
         s->at[j].value[1][k] = use ? g : 0.0F;
@@ -92,8 +114,13 @@ WEFT_INLINE void read_sites(const block_nodes *nodes, int step_log2, int j, cons
     const float *const site = in->rgb[0] + first;
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
-        const float value = site[k] * (k & 1 ? scale[1][k] : scale[0][k]);
-        const int use = (fabsf(value) < 1e30F) & (site[k] >= in->least) & (site[k] <= limit);
+        const float over = k & 1 ? scale[1][k] : scale[0][k], value = site[k] * over;
+        const int dark = site[k]<in->least, clipped = site[k]> limit;
+        const int use = (fabsf(value) < 1e30F) & !dark & !clipped;
+        const float variance = over * (in->read * over + in->shot * (value > 0 ? value : 0.0F));
+        s->at[j].variance[k] = use ? variance : 0.0F;
+        s->dark[k] += dark ? 1.0F : 0.0F;
+        s->clipped[k] += clipped ? 1.0F : 0.0F;
         s->at[j].weight[k] = use ? 1.0F : 0.0F;
         s->at[j].value[0][k] = use ? value : 0.0F;
         s->at[j].grey[k] = use ? value : 0.0F;
@@ -117,8 +144,10 @@ WEFT_INLINE void leave_out_clipped(const uint8_t *clipped, int j, weft_solve_sam
 {
     int leave[LANES];
 #pragma omp simd
-    for (int k = 0; k < LANES; k++)
+    for (int k = 0; k < LANES; k++) {
         leave[k] = clipped[k] != 0;
+        s->clipped[k] += leave[k] ? 1.0F : 0.0F;
+    }
     leave_out(s, j, leave);
 }
 
@@ -133,8 +162,10 @@ WEFT_INLINE void leave_out_shadow(weft_solve_samples *s, float part)
     for (int j = 0; j < s->n_lights; j++) {
         int leave[LANES];
 #pragma omp simd
-        for (int k = 0; k < LANES; k++)
+        for (int k = 0; k < LANES; k++) {
             leave[k] = s->at[j].grey[k] < part * limit[k];
+            s->dark[k] += leave[k] ? 1.0F : 0.0F;
+        }
         leave_out(s, j, leave);
     }
 }
@@ -155,11 +186,13 @@ WEFT_INLINE weft_solve_row_in copy_margin(const weft_solve_row_in *in, int first
         memcpy(m->clipped, in->clipped + first, (size_t)n);
     else
         memset(m->clipped, 0, (size_t)n);
-    return (weft_solve_row_in){{m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least, in->most};
+    return (weft_solve_row_in){
+        {m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least, in->most, in->read, in->shot};
 }
 
 WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, int row, int block,
-                                  const weft_solve_row_in *in, block_nodes *nodes, weft_solve_samples *s)
+                                  const weft_solve_row_in *in, bool with_view, block_nodes *nodes,
+                                  weft_solve_samples *s)
 {
     const weft_incidence *const inc = plan->incidence;
     const int first = block * LANES, n = plan->width - first < LANES ? plan->width - first : LANES;
@@ -168,6 +201,10 @@ WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, in
     interpolate_nodes(inc, step_log2, row, block, nodes);
     expand(nodes, step_log2, 0, x);
     expand(nodes, step_log2, 1, y);
+    if (s->gloss || with_view)
+        point_at_eye(inc, x, y, s);
+    memset(s->clipped, 0, sizeof s->clipped);
+    memset(s->dark, 0, sizeof s->dark);
     for (int j = 0; j < inc->n_lights; j++) {
         margin m;
         const bool whole = n == LANES;
@@ -185,14 +222,33 @@ WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, in
 }
 
 WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
-                               block_nodes *nodes, weft_solve_samples *s)
+                               bool with_view, block_nodes *nodes, weft_solve_samples *s)
 {
     if (plan->incidence->step_log2 == 4)
-        gather_with_step(plan, 4, row, block, in, nodes, s);
+        gather_with_step(plan, 4, row, block, in, with_view, nodes, s);
     else
-        gather_with_step(plan, plan->incidence->step_log2, row, block, in, nodes, s);
+        gather_with_step(plan, plan->incidence->step_log2, row, block, in, with_view, nodes, s);
 }
 
+static void begin_row(const weft_solve_plan *plan, block_nodes *nodes, weft_solve_samples *samples)
+{
+    *nodes = (block_nodes){0};
+    for (int k = 0; k < LANES; k++)
+        nodes->part[k] = (float)k / (float)(1 << plan->incidence->step_log2);
+    samples->n_lights = plan->incidence->n_lights;
+    samples->n_channels = plan->cfa == WEFT_CFA_NONE ? 3 : 1;
+    samples->gloss = plan->gloss;
+}
+
+void weft_solve_gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
+                       weft_solve_samples *samples)
+{
+    block_nodes nodes;
+    begin_row(plan, &nodes, samples);
+    gather(plan, row, block, in, true, &nodes, samples);
+}
+
+/* Lanes [0, n) of the answers to columns [first, first + n). */
 static void scatter(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out, int first,
                     int n)
 {
@@ -203,24 +259,101 @@ static void scatter(const weft_solve_answers *a, int n_channels, const weft_solv
         memcpy(out->albedo[c] + first, a->albedo[c], bytes);
     memcpy(out->residual + first, a->residual, bytes);
     memcpy(out->confidence + first, a->confidence, bytes);
-    for (int k = 0; k < n; k++)
+    memcpy(out->angle + first, a->angle, bytes);
+    for (int k = 0; k < n; k++) {
+        out->lights[first + k] = (uint8_t)a->n_used[k];
+        out->quality[first + k] = (uint8_t)a->quality[k];
         out->valid[first + k] = a->valid[k] > 0 ? 255 : 0;
+    }
+}
+
+/* ---- pixels that ask for a search: gathered over the row until they fill the lanes ---- */
+
+typedef struct search_queue {
+    int n, column[LANES];
+    weft_solve_samples samples;
+} search_queue;
+
+static void copy_lane(const weft_solve_samples *from, int k, weft_solve_samples *to, int q)
+{
+    for (int j = 0; j < from->n_lights; j++) {
+        const weft_solve_light *const a = &from->at[j];
+        weft_solve_light *const b = &to->at[j];
+        for (int c = 0; c < 3; c++)
+            b->light[c][q] = a->light[c][k];
+        for (int c = 0; c < from->n_channels; c++)
+            b->value[c][q] = a->value[c][k];
+        b->grey[q] = a->grey[k];
+        b->weight[q] = a->weight[k];
+        b->variance[q] = a->variance[k];
+    }
+    for (int c = 0; from->gloss && c < 3; c++)
+        to->view[c][q] = from->view[c][k];
+    to->clipped[q] = from->clipped[k];
+    to->dark[q] = from->dark[k];
+}
+
+static void copy_answer(const weft_solve_answers *from, int q, int n_channels, const weft_solve_row_out *out,
+                        int column)
+{
+    for (int c = 0; c < 3; c++)
+        out->normal[c][column] = from->normal[c][q];
+    for (int c = 0; c < n_channels; c++)
+        out->albedo[c][column] = from->albedo[c][q];
+    out->residual[column] = from->residual[q];
+    out->confidence[column] = from->confidence[q];
+    out->angle[column] = from->angle[q];
+    out->lights[column] = (uint8_t)from->n_used[q];
+    out->quality[column] = (uint8_t)from->quality[q];
+    out->valid[column] = from->valid[q] > 0 ? 255 : 0;
+}
+
+static void flush(const weft_solve_plan *plan, search_queue *queue, const weft_solve_row_out *out)
+{
+    weft_solve_answers answers;
+    if (queue->n == 0)
+        return;
+    for (int q = queue->n; q < LANES; q++)
+        copy_lane(&queue->samples, 0, &queue->samples, q);
+    plan->method->search(&queue->samples, &answers);
+    for (int q = 0; q < queue->n; q++)
+        copy_answer(&answers, q, queue->samples.n_channels, out, queue->column[q]);
+    queue->n = 0;
+}
+
+static void enqueue(const weft_solve_plan *plan, const weft_solve_samples *samples,
+                    const weft_solve_answers *answers, int first, int n, search_queue *queue,
+                    const weft_solve_row_out *out)
+{
+    for (int k = 0; k < n; k++) {
+        if (!(answers->search[k] > 0 || (plan->search_all && answers->valid[k] > 0)))
+            continue;
+        copy_lane(samples, k, &queue->samples, queue->n);
+        queue->column[queue->n++] = first + k;
+        if (queue->n == LANES)
+            flush(plan, queue, out);
+    }
 }
 
 void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,
                     const weft_solve_row_out *out)
 {
-    block_nodes nodes = {0};
+    block_nodes nodes;
     weft_solve_samples samples;
     weft_solve_answers answers;
-    for (int k = 0; k < LANES; k++)
-        nodes.part[k] = (float)k / (float)(1 << plan->incidence->step_log2);
-    samples.n_lights = plan->incidence->n_lights;
-    samples.n_channels = plan->cfa == WEFT_CFA_NONE ? 3 : 1;
+    search_queue queue;
+    begin_row(plan, &nodes, &samples);
+    queue.samples.n_lights = samples.n_lights;
+    queue.samples.n_channels = samples.n_channels;
+    queue.samples.gloss = samples.gloss;
+    queue.n = 0;
     for (int first = 0; first < plan->width; first += LANES) {
         const int n = plan->width - first < LANES ? plan->width - first : LANES;
-        gather(plan, row, first / LANES, in, &nodes, &samples);
-        plan->method(&samples, &answers);
+        gather(plan, row, first / LANES, in, false, &nodes, &samples);
+        plan->method->solve(&samples, &answers);
         scatter(&answers, samples.n_channels, out, first, n);
+        if (plan->method->search)
+            enqueue(plan, &samples, &answers, first, n, &queue, out);
     }
+    flush(plan, &queue, out);
 }

@@ -11,22 +11,28 @@ typedef struct weft_solve_row_in {
     const uint8_t *clipped; /* [width] non-zero: not to be used; NULL: none */
     float least;            /* the largest channel must reach this (3 sigma of black); 0: no rule */
     float most;             /* and not exceed this (98 % of saturation); 0: no rule */
+    float read;             /* variance of black, (1/s)^2; 0 with shot 0: the noise is not known */
+    float shot;             /* variance per linear value */
 } weft_solve_row_in;
 
 /** Where the answers of a row go; all [width]. */
 typedef struct weft_solve_row_out {
     float *normal[3], *residual, *confidence;
-    float *albedo[3]; /* of a mosaic only [0] is written: each site's own colour */
-    uint8_t *valid;   /* 255 or 0 */
+    float *angle;              /* expected error of the normal, radians */
+    uint8_t *lights, *quality; /* lights used; weft_solve_quality bits */
+    float *albedo[3];          /* of a mosaic only [0] is written: each site's own colour */
+    uint8_t *valid;            /* 255 or 0 */
 } weft_solve_row_out;
 
 /** What is the same for every row. */
 typedef struct weft_solve_plan {
     const weft_incidence *incidence;
-    weft_solve_fn *method;
+    const weft_solve_method *method;
     int width;
-    weft_cfa cfa; /* rows are of a mosaic and every site is solved by its own colour; or NONE */
-    float shadow; /* samples below this part of the pixel's brightest I' are left out; 0: none */
+    weft_cfa cfa;            /* rows are of a mosaic and every site is solved by its own colour; or NONE */
+    float shadow;            /* samples below this part of the pixel's brightest I' are left out; 0: none */
+    const weft_gloss *gloss; /* what is known of the mirror light; NULL: nothing */
+    bool search_all;         /* benchmarks only: send every answered pixel to the method's search */
 } weft_solve_plan;
 
 /**
@@ -44,5 +50,10 @@ typedef struct weft_solve_plan {
  */
 void weft_solve_row(const weft_solve_plan *plan, int row, const weft_solve_row_in *in,
                     const weft_solve_row_out *out);
+
+/** The samples of one block of 16 pixels as the methods see them, `view` included: for fits over a picture.
+ *  @param block  column / 16 */
+void weft_solve_gather(const weft_solve_plan *plan, int row, int block, const weft_solve_row_in *in,
+                       weft_solve_samples *samples);
 
 #endif

@@ -22,8 +22,8 @@ typedef struct work {
     weft_incidence incidence;
     float *in[N][3]; /* [HEIGHT][WIDTH]; a mosaic uses [0] alone */
     uint8_t *clipped[N];
-    float *out[8];
-    uint8_t *valid;
+    float *out[9];
+    uint8_t *valid, *lights, *quality;
 } work;
 
 static work w;
@@ -51,14 +51,16 @@ static void make_work(void)
                 w.in[j][c][i] = (float)(3 + sin(0.01 * i + j + c));
         }
     }
-    for (int i = 0; i < 8; i++)
+    for (int i = 0; i < 9; i++)
         w.out[i] = plane();
     w.valid = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
+    w.lights = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
+    w.quality = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
 }
 
 static double solve_ns(weft_cfa cfa)
 {
-    const weft_solve_plan plan = {&w.incidence, weft_solve_lsq, WIDTH, cfa, 0};
+    const weft_solve_plan plan = {&w.incidence, &weft_method_lsq, WIDTH, cfa, 0, NULL, false};
     const double begin = now_s();
     for (int v = 0; v < HEIGHT; v++) {
         const size_t at = (size_t)v * WIDTH;
@@ -69,11 +71,16 @@ static double solve_ns(weft_cfa cfa)
                     {w.in[j][0] + at, w.in[j][cfa ? 0 : 1] + at, w.in[j][cfa ? 0 : 2] + at},
                     w.clipped[j] + at,
                     0.01F,
-                    1e6F};
+                    1e6F,
+                    1e-6F,
+                    1e-4F};
         const weft_solve_row_out out = {.normal = {w.out[0] + at, w.out[1] + at, w.out[2] + at},
                                         .albedo = {w.out[3] + at, w.out[4] + at, w.out[5] + at},
                                         .residual = w.out[6] + at,
                                         .confidence = w.out[7] + at,
+                                        .angle = w.out[8] + at,
+                                        .lights = w.lights + at,
+                                        .quality = w.quality + at,
                                         .valid = w.valid + at};
         weft_solve_row(&plan, v, in, &out);
     }

@@ -27,6 +27,7 @@ expect 1 '--force' "$weft" import flat -o flat.set
 expect 0 '100.0 % with an answer' "$weft" solve flat.set -c flat.cal -o flat.maps
 expect 1 'flat.maps' "$weft" solve flat.set -c flat.cal -o flat.maps
 expect 0 '' "$weft" solve flat.set -c flat.cal -o flat.maps --force -q
+test -f flat.maps/uncertainty.exr -a -f flat.maps/lights.png -a -f flat.maps/quality.png
 test -f flat.maps/normal.exr -a -f flat.maps/maps.json -a -f flat.maps/albedo.png
 expect 0 'max 0.0000 deg' "$weft" compare flat.maps flat.maps
 "$weft" compare flat.maps flat.maps --json | python3 -c '
@@ -36,7 +37,7 @@ assert d["normal_deg"]["n"] == 32 * 24 and d["normal_deg"]["max"] == 0, d'
 python3 -c '
 import json
 i = json.load(open("flat.maps/maps.json"))
-assert i["options"]["method"] == "lsq" and i["result"]["answered_px"] == 768, i
+assert i["options"]["method"] == "robust" and i["result"]["answered_px"] == 768, i
 assert i["result"]["residual_mean"] < 1e-4 and i["result"]["confidence_mean"] > 0.9, i'
 cp -r flat.set other.set
 "$weft" solve flat.set other.set -c flat.cal -o both -q --json | python3 -c '
@@ -48,7 +49,7 @@ test ! -e twice
 
 expect 2 'SET... is missing' "$weft" solve -c flat.cal -o x
 expect 2 '--calibration' "$weft" solve flat.set -o x
-expect 2 'there are: lsq' "$weft" solve flat.set -c flat.cal -o x --method robuster
+expect 2 'there are: robust, lsq, svd' "$weft" solve flat.set -c flat.cal -o x --method robuster
 expect 1 'absent.cal' "$weft" solve flat.set -c absent.cal -o x
 expect 1 'absent.set' "$weft" solve absent.set -c flat.cal -o x
 expect 1 'there is no folder nowhere' "$weft" solve flat.set -c flat.cal -o nowhere/x

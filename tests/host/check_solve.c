@@ -183,7 +183,7 @@ static void test_maps_say_how_they_were_made(void **state)
     assert_int_equal(strlen(json_string_value(json_object_get(frames, "light-03.png"))), 64);
     assert_non_null(json_object_get(json_object_get(inputs, "calibration"), "calibration.json"));
     assert_string_equal(json_string_value(json_object_get(json_object_get(maps.info, "options"), "method")),
-                        "lsq");
+                        "robust");
     assert_true(json_number_value(json_object_get(json_object_get(maps.info, "seconds"), "solve")) > 0);
     const char *const folder = weft_test_path("said.maps");
     assert_ok(weft_maps_save(folder, &maps, false, err));

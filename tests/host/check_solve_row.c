@@ -19,8 +19,8 @@ typedef struct scene {
     double normal[HEIGHT][WIDTH][3], albedo[HEIGHT][WIDTH][3];
     float rgb[N][3][HEIGHT][WIDTH];
     uint8_t clipped[N][HEIGHT][WIDTH];
-    float out[8][HEIGHT][WIDTH];
-    uint8_t valid[HEIGHT][WIDTH];
+    float out[9][HEIGHT][WIDTH];
+    uint8_t valid[HEIGHT][WIDTH], lights[HEIGHT][WIDTH], quality[HEIGHT][WIDTH];
 } scene;
 
 static scene s; /* 8 MB */
@@ -52,7 +52,7 @@ static void begin(double height_mm)
     draw(height_mm);
     assert_ok(
         weft_incidence_init(&s.incidence, &s.cal, WIDTH, HEIGHT, (weft_pixel_scale){1, 0}, height_mm, err));
-    s.plan = (weft_solve_plan){&s.incidence, weft_solve_lsq, WIDTH, WEFT_CFA_NONE, 0};
+    s.plan = (weft_solve_plan){&s.incidence, &weft_method_lsq, WIDTH, WEFT_CFA_NONE, 0, NULL, false};
 }
 
 static void end(void)
@@ -70,11 +70,14 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
         weft_solve_row_in in[N];
         for (int j = 0; j < N; j++)
             in[j] = (weft_solve_row_in){
-                {s.rgb[j][0][v], s.rgb[j][1][v], s.rgb[j][2][v]}, s.clipped[j][v], least, most};
+                {s.rgb[j][0][v], s.rgb[j][1][v], s.rgb[j][2][v]}, s.clipped[j][v], least, most, 0, 0};
         const weft_solve_row_out out = {.normal = {s.out[0][v], s.out[1][v], s.out[2][v]},
                                         .albedo = {s.out[3][v], s.out[4][v], s.out[5][v]},
                                         .residual = s.out[6][v],
                                         .confidence = s.out[7][v],
+                                        .angle = s.out[8][v],
+                                        .lights = s.lights[v],
+                                        .quality = s.quality[v],
                                         .valid = s.valid[v]};
         weft_solve_row(&s.plan, v, in, &out);
     }
@@ -218,9 +221,8 @@ static int reference(const weft_solve_samples *samples, int k, double scaled[3],
     return m;
 }
 
-static void test_agrees_with_svd(void **state)
+static void agrees_with_lapack(const weft_solve_method *method)
 {
-    (void)state;
     uint64_t random = 4711;
     double worst = 0;
     int compared = 0, refused = 0;
@@ -228,7 +230,7 @@ static void test_agrees_with_svd(void **state)
         weft_solve_samples samples;
         weft_solve_answers answers;
         random_samples(&samples, &random, round % 2 ? 0 : 0.6);
-        weft_solve_lsq(&samples, &answers);
+        method->solve(&samples, &answers);
         for (int k = 0; k < LANES; k++) {
             double scaled[3], singular;
             const int m = reference(&samples, k, scaled, &singular);
@@ -244,9 +246,17 @@ static void test_agrees_with_svd(void **state)
             }
         }
     }
-    print_message("%d pixels, worst difference %.2g degrees, %d refused by both\n", compared, worst, refused);
+    print_message("%s: %d pixels, worst difference %.2g degrees, %d refused by both\n", method->name,
+                  compared, worst, refused);
     assert_true(compared > 50000 && refused > 500);
     assert_true(worst < 1e-3);
+}
+
+static void test_agrees_with_svd(void **state)
+{
+    (void)state;
+    agrees_with_lapack(&weft_method_lsq);
+    agrees_with_lapack(&weft_method_svd);
 }
 
 static void test_shared_vectors(void **state)
@@ -273,7 +283,7 @@ static void test_shared_vectors(void **state)
             samples.at[j].weight[5] = 1;
             samples.at[j].grey[5] = samples.at[j].value[0][5];
         }
-        weft_solve_lsq(&samples, &answers);
+        weft_method_lsq.solve(&samples, &answers);
         const double n[3] = {answers.normal[0][5], answers.normal[1][5], answers.normal[2][5]};
         worst = fmax(worst, dome_angle_deg(n, x + 50));
         rows++;
@@ -397,7 +407,7 @@ static void test_lights_in_one_plane_give_no_answer(void **state)
                 samples.at[j].value[c][k] = (float)(z / length);
             samples.at[j].grey[k] = (float)(z / length);
         }
-    weft_solve_lsq(&samples, &answers);
+    weft_method_lsq.solve(&samples, &answers);
     for (int k = 0; k < LANES; k++) {
         double singular, a[12], b[4], values[3];
         int rank;
@@ -462,7 +472,7 @@ static void test_same_bits_on_any_number_of_threads(void **state)
 {
     (void)state;
     begin(0);
-    static float first[8][HEIGHT][WIDTH];
+    static float first[9][HEIGHT][WIDTH];
     static const int threads[] = {1, 2, 7};
     for (int i = 0; i < 3; i++) {
         weft_parallel_set_threads(threads[i]);
@@ -486,7 +496,7 @@ static void test_writes_nothing_past_the_row(void **state)
     solve();
     float guard;
     memset(&guard, 0x55, sizeof guard);
-    for (int i = 0; i < 8; i++)
+    for (int i = 0; i < 9; i++)
         assert_true(s.out[i][3][37] == guard);
     assert_int_equal(s.valid[3][37], 7);
     assert_int_equal(s.valid[3][36], 255);
