@@ -22,8 +22,6 @@
 #define CLIPPED_SHARE 0.001
 /* A room this bright costs range and adds its own noise. */
 #define BRIGHT_ROOM 0.05
-/* How long an unplugged controller is waited for. */
-#define COMES_BACK_WITHIN_S 10
 /* A DNG is its samples and some tags. */
 #define DNG_TAGS_BYTES 65536
 #define SPARE_BYTES    (UINT64_C(4) << 20)
@@ -59,6 +57,7 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     o->settle_s = o->settle_s > 0 ? o->settle_s : 0.005;
     o->deadline_s = o->deadline_s > 0 ? o->deadline_s : 6;
     o->tries = o->tries ? o->tries : 3;
+    o->patience_s = o->patience_s > 0 ? o->patience_s : 10;
     run->shooter.level = o->level;
     run->shooter.settle_s = o->settle_s;
     run->shooter.deadline_s = o->deadline_s;
@@ -185,8 +184,8 @@ static weft_err come_back(capture_run *run, weft_err status, weft_error *why, we
             *err = *why;
         return status;
     }
-    weft_warn("%s; waiting %d s for it", why->text, COMES_BACK_WITHIN_S);
-    return weft_controller_reopen(c, COMES_BACK_WITHIN_S, err);
+    weft_warn("%s; waiting %g s for it", why->text, run->o.patience_s);
+    return weft_controller_reopen(c, run->o.patience_s, err);
 }
 
 /* One exposure; a controller that was unplugged and is back gives a reason to take it again. */
