@@ -1,0 +1,450 @@
+#include "shading/material/composite.h"
+
+#include "core/file.h"
+#include "core/mem.h"
+#include "shading/material/blend.h"
+#include "shading/material/mask.h"
+#include "shading/material/texture.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { DEFAULT_SIDE = 256, MAX_DEPTH = 64 };
+
+void weft_scan_fini(weft_scan *scan)
+{
+    weft_image *const images[] = {&scan->albedo,    &scan->normal, &scan->specular,
+                                  &scan->roughness, &scan->height, &scan->opacity};
+    for (size_t i = 0; i < sizeof images / sizeof images[0]; i++)
+        weft_image_fini(images[i]);
+    *scan = (weft_scan){0};
+}
+
+/* A texture property and where it goes. */
+typedef struct texture_row {
+    const char *property;
+    weft_texture_use use;
+    weft_baked_kind kind;
+    bool multiplies; /* the constant of the property beside it */
+} texture_row;
+
+static const texture_row textures[] = {
+    {"albedo_map", WEFT_TEXTURE_COLOUR, WEFT_BAKED_ALBEDO, false},
+    {"specular_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_SPECULAR, true},
+    {"roughness_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_ROUGHNESS, true},
+    {"normal_map", WEFT_TEXTURE_NORMAL, WEFT_BAKED_NORMAL, false},
+    {"height_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_HEIGHT, false},
+    {"occlusion_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_OCCLUSION, false},
+    {"opacity_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_OPACITY, true},
+};
+
+typedef struct compositor {
+    weft_assets *assets;
+    const weft_composite_options *options;
+    int width, height;
+    double size_mm[2];
+    bool periodic;
+} compositor;
+
+/* Set by a text, not by the defaults of the type. */
+static const weft_rad_member *set(const weft_rad_record *record, const char *name)
+{
+    const weft_rad_member *const m = weft_rad_at(record, name);
+    return m && m->set_by && !weft_material_type_find(m->set_by) ? m : NULL;
+}
+
+static weft_err scan_path(const weft_rad_member *scan, char **path, weft_error *err)
+{
+    char *const folder = weft_path_folder(scan->value->place.source->path, err);
+    *path = folder ? weft_path_join(strcmp(folder, ".") == 0 ? NULL : folder, scan->value->text, err) : NULL;
+    weft_free(folder);
+    return *path ? WEFT_OK : WEFT_ERR_NOMEM;
+}
+
+static weft_err load_scan(const compositor *c, const weft_rad_member *member, weft_scan *scan,
+                          weft_error *err)
+{
+    char *path;
+    if (!c->options->load_scan)
+        return weft_fail(err, WEFT_ERR_UNSUPPORTED, "%s: scans cannot be read here",
+                         weft_place_text(member->place));
+    WEFT_TRY(scan_path(member, &path, err));
+    *scan = (weft_scan){0};
+    weft_err status = c->options->load_scan(c->options->context, path, scan, err);
+    weft_free(path);
+    if (status == WEFT_OK && scan->normal.planes == 0 && scan->albedo.planes == 0)
+        status = weft_fail(err, WEFT_ERR_MISSING, "the scan has neither normals nor albedo");
+    return status == WEFT_OK ? WEFT_OK
+                             : weft_prefix(err, status, "%s", weft_place_text(member->value->place));
+}
+
+/* -- the files and the size --------------------------------------------------------------------------- */
+
+typedef weft_err visit_fn(void *context, weft_assets *assets, const weft_rad_record *properties,
+                          weft_error *err);
+
+/* Calls `fn` for the material and all that lies in its layers. */
+static weft_err visit(weft_assets *assets, const weft_rad_record *properties, visit_fn *fn, void *context,
+                      int depth, weft_error *err)
+{
+    WEFT_TRY(fn(context, assets, properties, err));
+    static const char *const lists[] = {"layers", "runtime_layers"};
+    for (int k = 0; k < 2; k++) {
+        const weft_rad_member *const layers = weft_rad_at(properties, lists[k]);
+        for (const weft_rad_value *item = layers ? layers->value->items : NULL; item && depth < MAX_DEPTH;
+             item = item->next) {
+            weft_asset layer;
+            WEFT_TRY(weft_assets_layer(assets, &item->record, &layer, err));
+            WEFT_TRY(visit(assets, &layer.properties, fn, context, depth + 1, err));
+        }
+    }
+    return WEFT_OK;
+}
+
+typedef struct input_visit {
+    weft_composite_input_fn *fn;
+    void *context;
+} input_visit;
+
+static weft_err visit_texture(const input_visit *v, const weft_rad_record *record, weft_error *err)
+{
+    const weft_rad_member *const name = weft_rad_at(record, "name");
+    char *path;
+    if (!name)
+        return WEFT_OK;
+    WEFT_TRY(weft_texture_path(name->value, &path, err));
+    v->fn(v->context, path, false);
+    weft_free(path);
+    return WEFT_OK;
+}
+
+static weft_err visit_inputs(void *context, weft_assets *assets, const weft_rad_record *p, weft_error *err)
+{
+    const input_visit *const v = context;
+    (void)assets;
+    for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) {
+        const weft_rad_member *const m = weft_rad_at(p, textures[i].property);
+        if (m)
+            WEFT_TRY(visit_texture(v, &m->value->record, err));
+    }
+    const weft_rad_member *const mask = weft_rad_at(p, "mask"), *const scan = weft_rad_at(p, "scan");
+    if (mask)
+        WEFT_TRY(visit_texture(v, &mask->value->record, err));
+    if (scan) {
+        char *path;
+        WEFT_TRY(scan_path(scan, &path, err));
+        v->fn(v->context, path, true);
+        weft_free(path);
+    }
+    return WEFT_OK;
+}
+
+weft_err weft_composite_inputs(weft_assets *assets, const weft_asset *asset, weft_composite_input_fn *fn,
+                               void *context, weft_error *err)
+{
+    input_visit v = {fn, context};
+    return visit(assets, &asset->properties, visit_inputs, &v, 0, err);
+}
+
+static void grow(compositor *c, int width, int height)
+{
+    if ((long)width * height > (long)c->width * c->height) {
+        c->width = width;
+        c->height = height;
+    }
+}
+
+/* The largest picture decides the size; the outermost scan of known scale the millimetres. */
+static weft_err visit_size(void *context, weft_assets *assets, const weft_rad_record *p, weft_error *err)
+{
+    compositor *const c = context;
+    (void)assets;
+    const weft_rad_member *const scan_name = weft_rad_at(p, "scan");
+    if (scan_name) {
+        weft_scan scan;
+        WEFT_TRY(load_scan(c, scan_name, &scan, err));
+        const weft_image *const one = scan.normal.planes ? &scan.normal : &scan.albedo;
+        grow(c, one->width, one->height);
+        if (!(c->size_mm[0] > 0)) {
+            c->size_mm[0] = scan.mm_per_px * one->width;
+            c->size_mm[1] = scan.mm_per_px * one->height;
+            c->periodic = c->periodic || scan.periodic;
+        }
+        weft_scan_fini(&scan);
+    }
+    for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) {
+        const weft_rad_member *const m = weft_rad_at(p, textures[i].property);
+        if (!m || !weft_rad_at(&m->value->record, "name"))
+            continue;
+        weft_image image;
+        WEFT_TRY(weft_texture_read(&m->value->record, textures[i].use, &image, err));
+        grow(c, image.width, image.height);
+        weft_image_fini(&image);
+    }
+    return WEFT_OK;
+}
+
+/* -- one material's own properties -------------------------------------------------------------------- */
+
+static void drop_map(weft_baked *baked, weft_baked_kind kind)
+{
+    for (int level = 0; level < WEFT_BAKED_MAX_MIPS; level++)
+        weft_image_fini(&baked->maps[kind].mips[level]);
+    baked->maps[kind].n_mips = 0;
+}
+
+static void set_constant(weft_baked *baked, weft_baked_kind kind, int planes, const double *values)
+{
+    drop_map(baked, kind);
+    for (int p = 0; p < weft_baked_rows[kind].planes; p++)
+        baked->maps[kind].constant[p] = (float)values[planes == 1 ? 0 : p];
+}
+
+static void multiply(weft_baked *baked, weft_baked_kind kind, const double *factors, int planes)
+{
+    weft_baked_map *const map = &baked->maps[kind];
+    for (int p = 0; p < weft_baked_rows[kind].planes; p++) {
+        const float factor = (float)factors[planes == 1 ? 0 : p];
+        map->constant[p] *= factor;
+        for (size_t i = 0; map->n_mips > 0 && i < weft_image_plane_size(&map->mips[0]); i++)
+            weft_image_plane(&map->mips[0], p)[i] *= factor;
+    }
+}
+
+/* A picture becomes a map; with fewer planes than the map it multiplies the constant that is there. */
+static weft_err put(const compositor *c, weft_baked *baked, weft_baked_kind kind, const weft_image *image,
+                    weft_texture_use use, const double tiling[2], bool multiplies, weft_error *err)
+{
+    weft_image at_size;
+    WEFT_TRY(weft_texture_resample(image, use, c->width, c->height, tiling, &at_size, err));
+    float factor[4];
+    memcpy(factor, baked->maps[kind].constant, sizeof factor);
+    weft_err status = weft_baked_add(baked, kind, c->width, c->height, err);
+    weft_image *const to = &baked->maps[kind].mips[0];
+    for (int p = 0; status == WEFT_OK && p < to->planes; p++) {
+        const float *const from = weft_image_plane(&at_size, at_size.planes == 1 ? 0 : p);
+        const float scale = multiplies ? factor[p] : 1;
+        for (size_t i = 0; i < weft_image_plane_size(to); i++)
+            weft_image_plane(to, p)[i] = from[i] * scale;
+    }
+    weft_image_fini(&at_size);
+    return status;
+}
+
+static weft_err put_scan(const compositor *c, weft_baked *baked, const weft_rad_member *member,
+                         weft_error *err)
+{
+    weft_scan scan;
+    WEFT_TRY(load_scan(c, member, &scan, err));
+    const struct {
+        const weft_image *image;
+        weft_texture_use use;
+        weft_baked_kind kind;
+    } parts[] = {{&scan.albedo, WEFT_TEXTURE_COLOUR, WEFT_BAKED_ALBEDO},
+                 {&scan.normal, WEFT_TEXTURE_NORMAL, WEFT_BAKED_NORMAL},
+                 {&scan.specular, WEFT_TEXTURE_SCALAR, WEFT_BAKED_SPECULAR},
+                 {&scan.roughness, WEFT_TEXTURE_SCALAR, WEFT_BAKED_ROUGHNESS},
+                 {&scan.height, WEFT_TEXTURE_SCALAR, WEFT_BAKED_HEIGHT},
+                 {&scan.opacity, WEFT_TEXTURE_SCALAR, WEFT_BAKED_OPACITY}};
+    weft_err status = WEFT_OK;
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0] && status == WEFT_OK; i++) {
+        if (parts[i].image->planes == 0)
+            continue;
+        double tiling[2] = {1, 1};
+        const int w = parts[i].image->width, h = parts[i].image->height;
+        if (scan.mm_per_px > 0 && c->size_mm[0] > 0) { /* every scan at its own true size */
+            tiling[0] = c->size_mm[0] / (scan.mm_per_px * w);
+            tiling[1] = c->size_mm[1] / (scan.mm_per_px * h);
+        }
+        status = put(c, baked, parts[i].kind, parts[i].image, parts[i].use, tiling, false, err);
+    }
+    weft_scan_fini(&scan);
+    return status;
+}
+
+static weft_err put_texture(const compositor *c, weft_baked *baked, const texture_row *row,
+                            const weft_rad_record *record, weft_error *err)
+{
+    double tiling[2] = {1, 1};
+    weft_image image;
+    weft_rad_numbers(record, "tiling", 2, tiling);
+    WEFT_TRY(weft_texture_read(record, row->use, &image, err));
+    const weft_err status = put(c, baked, row->kind, &image, row->use, tiling, row->multiplies, err);
+    weft_image_fini(&image);
+    return status;
+}
+
+static void steepen(weft_baked *baked, double strength)
+{
+    weft_baked_map *const map = &baked->maps[WEFT_BAKED_NORMAL];
+    for (size_t i = 0; map->n_mips > 0 && i < weft_image_plane_size(&map->mips[0]); i++) {
+        float *const x = weft_image_plane(&map->mips[0], 0) + i, *const y =
+                                                                     weft_image_plane(&map->mips[0], 1) + i;
+        float *const z = weft_image_plane(&map->mips[0], 2) + i;
+        const double a = strength * (double)*x, b = strength * (double)*y, d = (double)*z;
+        const double length = sqrt(a * a + b * b + d * d);
+        *x = (float)(a / length);
+        *y = (float)(b / length);
+        *z = (float)(d / length);
+    }
+}
+
+/* Numbers and colours that replace: property, quantity, how many components. */
+static void apply_constants(weft_baked *baked, const weft_rad_record *p, bool only_set)
+{
+    static const struct {
+        const char *property;
+        weft_baked_kind kind;
+        int planes;
+    } rows[] = {
+        {"albedo_color", WEFT_BAKED_ALBEDO, 3},          {"specular_intensity", WEFT_BAKED_SPECULAR, 1},
+        {"specular_roughness", WEFT_BAKED_ROUGHNESS, 1}, {"anisotropy", WEFT_BAKED_ANISOTROPY, 1},
+        {"front_tint_color", WEFT_BAKED_FRONT_TINT, 3},  {"rim_tint_color", WEFT_BAKED_RIM_TINT, 3},
+        {"rim_amplitude", WEFT_BAKED_RIM_AMPLITUDE, 1},  {"opacity", WEFT_BAKED_OPACITY, 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        double values[3];
+        if (!(only_set ? set(p, rows[i].property) : weft_rad_at(p, rows[i].property)))
+            continue;
+        if (rows[i].planes == 3)
+            weft_rad_colour(p, rows[i].property, 1, values);
+        else
+            values[0] = weft_rad_number(p, rows[i].property, 0);
+        set_constant(baked, rows[i].kind, rows[i].planes, values);
+    }
+    if (only_set ? set(p, "tangent_rotation_deg") : weft_rad_at(p, "tangent_rotation_deg")) {
+        const double turn = weft_rad_number(p, "tangent_rotation_deg", 0) * acos(-1) / 180;
+        const double direction[2] = {cos(turn), sin(turn)};
+        set_constant(baked, WEFT_BAKED_TANGENT, 2, direction);
+    }
+}
+
+static void apply_factors(weft_baked *baked, const weft_rad_record *p)
+{
+    static const double black[3] = {0, 0, 0};
+    double tint[3];
+    if (weft_rad_at(p, "albedo_tint_color")) {
+        weft_rad_colour(p, "albedo_tint_color", 1, tint);
+        multiply(baked, WEFT_BAKED_ALBEDO, tint, 3);
+    }
+    if (weft_rad_at(p, "specular_tint_color")) {
+        weft_rad_colour(p, "specular_tint_color", 1, tint);
+        multiply(baked, WEFT_BAKED_SPECULAR, tint, 3);
+    }
+    const double strength = weft_rad_number(p, "normal_strength", 1);
+    if (fabs(strength - 1) > 0)
+        steepen(baked, strength);
+    if (!weft_rad_flag(p, "enable_diffuse", true))
+        set_constant(baked, WEFT_BAKED_ALBEDO, 3, black);
+    if (!weft_rad_flag(p, "enable_specular", true))
+        set_constant(baked, WEFT_BAKED_SPECULAR, 3, black);
+}
+
+/* @param only_set  over a composite: defaults of the type leave what the layers made */
+static weft_err apply_own(const compositor *c, weft_baked *baked, const weft_rad_record *p, bool only_set,
+                          weft_error *err)
+{
+    apply_constants(baked, p, only_set);
+    const weft_rad_member *const scan = weft_rad_at(p, "scan");
+    if (scan)
+        WEFT_TRY(put_scan(c, baked, scan, err));
+    for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) {
+        const weft_rad_member *const m = weft_rad_at(p, textures[i].property);
+        if (m && weft_rad_at(&m->value->record, "name"))
+            WEFT_TRY(put_texture(c, baked, &textures[i], &m->value->record, err));
+    }
+    apply_factors(baked, p);
+    return WEFT_OK;
+}
+
+/* -- layers ------------------------------------------------------------------------------------------- */
+
+static weft_err composite(const compositor *c, const weft_asset *asset, int depth, weft_baked *baked,
+                          weft_error *err);
+
+static unsigned channels_of(const weft_rad_record *p)
+{
+    static const struct {
+        const char *name;
+        unsigned channels;
+    } names[] = {{"albedo", WEFT_BLEND_ALBEDO},
+                 {"specular", WEFT_BLEND_SPECULAR},
+                 {"normal", WEFT_BLEND_NORMAL},
+                 {"albedo_specular", WEFT_BLEND_ALBEDO | WEFT_BLEND_SPECULAR},
+                 {"specular_normal", WEFT_BLEND_SPECULAR | WEFT_BLEND_NORMAL}};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (strcmp(weft_rad_text(p, "channels", "all"), names[i].name) == 0)
+            return names[i].channels;
+    return WEFT_BLEND_ALL;
+}
+
+static weft_err lay(const compositor *c, const weft_rad_value *item, int depth, weft_baked *below,
+                    weft_error *err)
+{
+    weft_asset layer;
+    weft_baked above = {0};
+    weft_image mask = {0};
+    WEFT_TRY(weft_assets_layer(c->assets, &item->record, &layer, err));
+    weft_err status = composite(c, &layer, depth + 1, &above, err);
+    const weft_rad_member *const record = weft_rad_at(&layer.properties, "mask");
+    if (status == WEFT_OK && record)
+        status = weft_mask_make(&record->value->record, below, &mask, err);
+    if (status == WEFT_OK)
+        status = weft_blend(below, &above, mask.planes ? mask.data : NULL,
+                            weft_rad_number(&layer.properties, "alpha", 1), channels_of(&layer.properties),
+                            strcmp(weft_rad_text(&layer.properties, "blend", "slope"), "rnm") == 0, err);
+    if (status != WEFT_OK)
+        weft_prefix(err, status, "%s: layer '%s'", weft_place_text(item->place), item->record.base);
+    weft_image_fini(&mask);
+    weft_baked_fini(&above);
+    return status;
+}
+
+static weft_err composite(const compositor *c, const weft_asset *asset, int depth, weft_baked *baked,
+                          weft_error *err)
+{
+    if (depth > MAX_DEPTH)
+        return weft_fail(err, WEFT_ERR_FORMAT, "%s: layers lie in layers deeper than %d", asset->name,
+                         MAX_DEPTH);
+    WEFT_TRY(weft_baked_init(baked, asset->name, asset->type, err));
+    baked->width = c->width;
+    baked->height = c->height;
+    memcpy(baked->size_mm, c->size_mm, sizeof baked->size_mm);
+    baked->periodic = c->periodic;
+    const weft_rad_member *const layers = weft_rad_at(&asset->properties, "layers");
+    weft_err status = WEFT_OK;
+    for (const weft_rad_value *item = layers ? layers->value->items : NULL; item && status == WEFT_OK;
+         item = item->next) {
+        if (item == layers->value->items) { /* nothing of the type's defaults lies under the lowest */
+            weft_asset lowest;
+            status = weft_assets_layer(c->assets, &item->record, &lowest, err);
+            if (status == WEFT_OK)
+                baked->type = lowest.type;
+            baked->maps[WEFT_BAKED_CLOTH].constant[0] = baked->type->model == WEFT_MATERIAL_CLOTH;
+        }
+        if (status == WEFT_OK)
+            status = lay(c, item, depth, baked, err);
+    }
+    if (status == WEFT_OK)
+        status = apply_own(c, baked, &asset->properties, layers && layers->value->items, err);
+    if (status != WEFT_OK)
+        weft_baked_fini(baked);
+    return status;
+}
+
+weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
+                        weft_baked *baked, weft_error *err)
+{
+    compositor c = {.assets = assets, .options = options, .periodic = options->periodic};
+    const weft_rad_record *const p = &asset->properties;
+    c.size_mm[0] = weft_rad_number(p, "width_mm", 0);
+    c.size_mm[1] = weft_rad_number(p, "height_mm", 0);
+    *baked = (weft_baked){0};
+    WEFT_TRY(visit(assets, p, visit_size, &c, 0, err));
+    if (options->width > 0) {
+        c.width = options->width;
+        c.height = options->height;
+    } else if (c.width == 0) {
+        c.width = c.height = DEFAULT_SIDE;
+    }
+    return composite(&c, asset, 0, baked, err);
+}

@@ -1,0 +1,177 @@
+/* Compositing against the formula worked by hand, textures' conventions, and what cannot be mixed. */
+#include "tests/support/support.h"
+
+#include "core/colour.h"
+#include "core/file.h"
+#include "core/formats/png_file.h"
+#include "shading/material/composite.h"
+
+#include <math.h>
+#include <string.h>
+
+static weft_err bake(const char *text, int side, weft_baked *baked, weft_error *err)
+{
+    const char *const path = weft_test_path("c.radattr");
+    weft_assets *assets = NULL;
+    weft_composite_options options = {.width = side, .height = side};
+    weft_err status = weft_file_write(path, text, strlen(text), err);
+    if (status == WEFT_OK)
+        status = weft_assets_load(path, NULL, &assets, err);
+    if (status == WEFT_OK)
+        status = weft_composite(assets, weft_assets_main(assets), &options, baked, err);
+    weft_assets_destroy(assets);
+    return status;
+}
+
+static void write_png(const char *name, int side, int channels, const uint16_t *data, int bits)
+{
+    weft_raster raster;
+    assert_ok(weft_raster_init(&raster, side, side, channels, bits, err));
+    memcpy(raster.data, data, (size_t)side * (size_t)side * (size_t)channels * sizeof *data);
+    assert_ok(weft_png_write(weft_test_path(name), &raster, err));
+    weft_raster_fini(&raster);
+}
+
+/* Three constants: each over the one below, then what the material itself sets (S-ORD-26). */
+static void check_constants(void **state)
+{
+    (void)state;
+    weft_baked b;
+    assert_ok(bake(":a := ( opaquematerial :albedo_color = 0.2 :specular_roughness = 0.4 )\n"
+                   ":b := ( opaquematerial :albedo_color = [1, 0, 0.5] :specular_roughness = 0.8 )\n"
+                   ":m := ( opaquematerial :specular_intensity = 0.08 :albedo_tint_color = [1, 1, 0.5]\n"
+                   "    :layers = [ ( a ) ( b :alpha = 0.25 ) ( a :alpha = 0.5 :channels = albedo ) ] )",
+                   8, &b, err));
+    const double red = 0.5 * (0.2 + 0.25 * (1 - 0.2)) + 0.5 * 0.2,
+                 blue = 0.5 * (0.2 + 0.25 * 0.3) + 0.5 * 0.2;
+    assert_int_equal(b.maps[WEFT_BAKED_ALBEDO].n_mips, 0);
+    assert_near((double)b.maps[WEFT_BAKED_ALBEDO].constant[0], red, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_ALBEDO].constant[2], 0.5 * blue, 1e-6); /* the tint multiplies */
+    assert_near((double)b.maps[WEFT_BAKED_ROUGHNESS].constant[0], 0.5, 1e-6);     /* alpha, not its square */
+    assert_near((double)b.maps[WEFT_BAKED_SPECULAR].constant[1], 0.08, 1e-6);     /* its own */
+    weft_baked_fini(&b);
+}
+
+static void check_mask_and_normals(void **state)
+{
+    (void)state;
+    static const uint16_t mask[4] = {0, 65535, 32768, 65535};
+    /* 8 bit: x = 0.6, y = 0, z = 0.8 as nearly as the codes have it */
+    static const uint16_t normals[12] = {204, 128, 230, 204, 128, 230, 204, 128, 230, 204, 128, 230};
+    weft_baked b;
+    write_png("mask.png", 2, 1, mask, 16);
+    write_png("nml.png", 2, 3, normals, 8);
+    assert_ok(
+        bake(":flat := ( opaquematerial )\n"
+             ":bumpy := ( opaquematerial :normal_map = ( :name = \"nml\" ) )\n"
+             ":m := ( opaquematerial :layers = [ ( flat ) ( bumpy :mask = ( :name = \"mask.png\" ) ) ] )",
+             2, &b, err));
+    const weft_image *const n = &b.maps[WEFT_BAKED_NORMAL].mips[0];
+    const double slope = (204 / 127.5 - 1) / (230 / 127.5 - 1); /* x/z of the layer */
+    for (int i = 0; i < 4; i++) {
+        const double w = mask[i] / 65535.0, x = (double)n->data[i], z = (double)weft_image_plane(n, 2)[i];
+        assert_near(x / z, w * slope, 1e-5);
+        assert_near(x * x + z * z + (double)(weft_image_plane(n, 1)[i] * weft_image_plane(n, 1)[i]), 1, 1e-6);
+    }
+    weft_baked_fini(&b);
+}
+
+static void check_texture_conventions(void **state)
+{
+    (void)state;
+    static const uint16_t colour[3] = {128, 255, 0}, normal[3] = {128, 255, 128};
+    weft_baked b;
+    write_png("colour.png", 1, 3, colour, 8);
+    write_png("down.png", 1, 3, normal, 8);
+    assert_ok(bake(":m := ( opaquematerial :albedo_map = ( :name = \"colour.png\" )\n"
+                   "  :specular_map = ( :name = \"colour.png\" :channel = r :scale = 2 :offset = -0.5 )\n"
+                   "  :roughness_map = ( :name = \"colour.png\" ) :specular_roughness = 0.6\n"
+                   "  :normal_map = ( :name = \"down.png\" :green = down ) )",
+                   0, &b, err));
+    assert_int_equal(b.width, 1);
+    assert_near((double)b.maps[WEFT_BAKED_ALBEDO].mips[0].data[0], weft_srgb_decode(128 / 255.0), 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_SPECULAR].mips[0].data[0], 0.04 * (2 * 128 / 255.0 - 0.5), 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_ROUGHNESS].mips[0].data[0], 0.6 * (128 + 255) / 765.0, 1e-6);
+    assert_true(b.maps[WEFT_BAKED_NORMAL].mips[0].data[1] < -0.99F);
+    weft_baked_fini(&b);
+}
+
+static void check_lobes(void **state)
+{
+    (void)state;
+    weft_baked b;
+    assert_ok(bake(":iso := ( opaquematerial :specular_roughness = 0.2 )\n"
+                   ":silk := ( anisotropicmaterial :specular_roughness = 0.6 :anisotropy = 0.5\n"
+                   "          :tangent_rotation_deg = 90 )\n"
+                   ":m := ( opaquematerial :layers = [ ( iso ) ( silk :alpha = 0.75 ) ] )",
+                   4, &b, err));
+    assert_string_equal(b.type->name, "anisotropicmaterial");
+    const double along = 0.2 + 0.75 * 0.4, across = 0.2 + 0.75 * 0.1;
+    assert_near((double)b.maps[WEFT_BAKED_ROUGHNESS].constant[0], along, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_ANISOTROPY].constant[0], 1 - across / along, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_TANGENT].constant[1], 1, 1e-6); /* the heavier layer's */
+    weft_baked_fini(&b);
+
+    assert_ok(bake(":wet := ( opaquematerial ) :wool := ( clothmaterial )\n"
+                   ":m := ( clothmaterial :layers = [ ( wool ) ( wet :alpha = 0.3 ) ] )",
+                   4, &b, err));
+    assert_string_equal(b.type->name, "clothmaterial");
+    assert_near((double)b.maps[WEFT_BAKED_CLOTH].constant[0], 0.7, 1e-6);
+    weft_baked_fini(&b);
+
+    assert_fails(bake(":silk := ( anisotropicmaterial ) :wool := ( clothmaterial )\n"
+                      ":m := ( clothmaterial :layers = [ ( wool ) ( silk :alpha = 0.3 ) ] )",
+                      4, &b, err),
+                 WEFT_ERR_UNSUPPORTED, "no model shades both");
+}
+
+/* Every mask is 0..1, and one from noise repeats. */
+static void check_generated_masks(void **state)
+{
+    (void)state;
+    static const char *const kinds[] = {"noise", "slope", "height", "cavity"};
+    static uint16_t normals[16 * 16 * 3];
+    for (int i = 0; i < 256; i++) {
+        normals[3 * i] = (uint16_t)(128 + 60 * sin(i * 0.39269908));
+        normals[3 * i + 1] = 128;
+        normals[3 * i + 2] = 240;
+    }
+    write_png("waves.png", 16, 3, normals, 8);
+    for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
+        char text[512];
+        weft_baked b;
+        (void)snprintf(text, sizeof text,
+                       ":w := ( opaquematerial :normal_map = ( :name = \"waves\" ) :albedo_color = 0 )\n"
+                       ":m := ( opaquematerial :layers = [ ( w ) ( opaquematerial :albedo_color = 1\n"
+                       "  :channels = albedo :mask = ( :from = %s :low = %s :high = %s ) ) ] )",
+                       kinds[k], k == 2 ? "-0.5" : "0.2", k == 2 ? "0.5" : "0.8");
+        assert_ok(bake(text, 0, &b, err));
+        float least = 1, most = 0;
+        for (int i = 0; i < 256; i++) {
+            least = fminf(least, b.maps[WEFT_BAKED_ALBEDO].mips[0].data[i]);
+            most = fmaxf(most, b.maps[WEFT_BAKED_ALBEDO].mips[0].data[i]);
+        }
+        assert_true(least >= 0 && most <= 1 && most - least > 0.3F);
+        weft_baked_fini(&b);
+    }
+}
+
+static void check_missing_files(void **state)
+{
+    (void)state;
+    weft_baked b;
+    assert_fails(bake(":m := ( opaquematerial :normal_map = ( :name = \"gone\" ) )", 4, &b, err),
+                 WEFT_ERR_MISSING, "c.radattr:1:48: there is no image");
+    assert_fails(bake(":m := ( opaquematerial :scan = \"x.maps\" )", 4, &b, err), WEFT_ERR_UNSUPPORTED,
+                 "1:25: scans");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(check_constants),           cmocka_unit_test(check_mask_and_normals),
+        cmocka_unit_test(check_texture_conventions), cmocka_unit_test(check_lobes),
+        cmocka_unit_test(check_generated_masks),     cmocka_unit_test(check_missing_files),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
