@@ -21,6 +21,7 @@ void fit_planes_fini(fit_planes *p)
     weft_free(p->residual);
     weft_free(p->weight);
     weft_free(p->nodes);
+    weft_free(p->colours);
 }
 
 weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_white_sheet *sheet, weft_error *err)
@@ -29,7 +30,8 @@ weft_err fit_planes_init(fit_planes *p, const fit_problem *f, const weft_white_s
     *p = (fit_planes){0};
     if (!(p->residual = weft_alloc((size_t)f->n_cells, sizeof(float), err)) ||
         !(p->weight = weft_alloc((size_t)f->n_cells, sizeof(float), err)) ||
-        !(p->nodes = weft_alloc((size_t)columns * (size_t)rows, sizeof(float), err)))
+        !(p->nodes = weft_alloc((size_t)columns * (size_t)rows, sizeof(float), err)) ||
+        !(p->colours = weft_alloc(3 * (size_t)columns * (size_t)rows, sizeof(float), err)))
         return WEFT_ERR_NOMEM;
     return fit_smooth_init(&p->smooth, sheet, columns, rows, err);
 }
@@ -100,7 +102,8 @@ weft_err fit_grid(const fit_problem *f, fit_planes *p, int light, int channel, f
 {
     int first;
     for (int i = 0; i < f->n_cells; i++)
-        p->residual[i] = (float)(fit_residual(f, light, channel, i) + f->common[i]); /* NaN stays */
+        p->residual[i] =
+            (float)(fit_ratio(f, light, channel, i) - fit_common_log(f->v, f->place[i])); /* NaN stays */
     const double detail = fit_smooth_robust(f, p, &first);
     WEFT_TRY(check_nodes(p, light, err));
     if (detail > DETAIL_MOST)
@@ -117,9 +120,41 @@ weft_err fit_grid(const fit_problem *f, fit_planes *p, int light, int channel, f
             const fit_place place = fit_place_at(f, (double)i * (f->width - 1) / (columns - 1),
                                                  (double)j * (f->height - 1) / (rows - 1));
             const int node = j * columns + i;
-            gain[node] = (float)exp((double)p->nodes[node] + fit_common_log(&f->shared, place));
+            gain[node] = (float)exp((double)p->nodes[node] + fit_common_log(f->v, place));
         }
     return WEFT_OK;
+}
+
+/* Smoothed residuals of a light and channel, dust left out. */
+static void smooth_residual(const fit_problem *f, fit_planes *p, int light, int channel, float *nodes)
+{
+    const double noise = f->noise[light][channel];
+    const float *const w = f->weight + fit_plane(f, light, channel);
+    for (int i = 0; i < f->n_cells; i++) {
+        p->residual[i] = (float)fit_residual(f, light, channel, i);
+        p->weight[i] = fabs((double)p->residual[i]) * sqrt((double)w[i]) < 5 * noise ? w[i] : 0;
+    }
+    fit_smooth_plane(&p->smooth, p->residual, p->weight, nodes);
+}
+
+double fit_model_error(const fit_problem *f, fit_planes *p)
+{
+    const int n = p->smooth.columns * p->smooth.rows;
+    double sum = 0, n_products = 0;
+    for (int l = 0; l < f->n_lights; l++) {
+        for (int c = 0; c < 3; c++)
+            smooth_residual(f, p, l, c, p->colours + (size_t)c * (size_t)n);
+        for (int i = 0; i < n; i++)
+            for (int c = 0; c < 3; c++) {
+                const double product =
+                    (double)p->colours[c * n + i] * (double)p->colours[(c + 1) % 3 * n + i];
+                if (isnan(product))
+                    continue;
+                sum += product;
+                n_products++;
+            }
+    }
+    return n_products > 0 ? fmax(sum / n_products, 0) : 0;
 }
 
 /* rms of measured/(model grid) - 1, dust left out. */
@@ -131,8 +166,7 @@ double fit_grid_residual(const fit_problem *f, const fit_planes *p, int light, c
     long n = 0;
     for (int c = 0; c < 3; c++)
         for (int i = 0; i < f->n_cells; i++) {
-            const double bare =
-                fit_residual(f, light, c, i) + fit_common_log(&f->shared, f->place[i]) + f->common[i];
+            const double bare = fit_ratio(f, light, c, i);
             const double g = fit_smooth_at(&p->smooth, gain + (size_t)(light * 3 + c) * nodes,
                                            weft_white_sheet_centre(sheet, i % sheet->columns),
                                            weft_white_sheet_centre(sheet, i / sheet->columns));

@@ -23,8 +23,10 @@ static weft_err thin_out(const fit_problem *f, fit_problem *coarse, weft_error *
     coarse->options = f->options;
     coarse->field_mm = f->field_mm;
     for (size_t i = 0; i < n; i++) {
-        coarse->x[i] = f->x[i * step];
+        coarse->cell[i] = f->cell[i * step];
         coarse->place[i] = f->place[i * step];
+        for (size_t c = 0; c < 3; c++)
+            coarse->common[c * n + i] = f->common[c * (size_t)f->n_cells + i * step];
         for (int l = 0; l < f->n_lights; l++)
             for (int c = 0; c < 3; c++) {
                 coarse->y[fit_plane(coarse, l, c) + i] = f->y[fit_plane(f, l, c) + i * step];
@@ -40,15 +42,17 @@ static double level(const fit_problem *f, int light, fit_lamp *lamp)
 {
     double sw[3] = {0}, sr[3] = {0}, srr = 0;
     for (int i = 0; i < f->n_cells; i++) {
-        const double model = fit_lamp_log(lamp, f->x[i]);
+        const fit_surface at = fit_surface_at(f, i);
+        const double model = fit_lamp_log(lamp, &at);
         if (isnan(model))
             return HUGE_VAL;
         for (int c = 0; c < 3; c++) {
-            const size_t at = fit_plane(f, light, c) + (size_t)i;
-            const double w = (double)f->weight[at];
+            const size_t plane = fit_plane(f, light, c) + (size_t)i;
+            const double w = (double)f->weight[plane];
             if (!(w > 0))
                 continue;
-            const double r = (double)f->y[at] - model;
+            const double r =
+                (double)f->y[plane] - model - f->common[(size_t)c * (size_t)f->n_cells + (size_t)i];
             sw[c] += w;
             sr[c] += w * r;
             if (c == 1)
@@ -97,7 +101,7 @@ static weft_err refine(fit_problem *coarse, int light, candidate best[N_BEST], w
     candidate winner = {.cost = HUGE_VAL};
     for (int i = 0; i < N_BEST && isfinite(best[i].cost); i++) {
         coarse->lamps[light] = best[i].lamp;
-        WEFT_TRY(fit_solve(coarse, (fit_scope){light, 1, false, 2}, err));
+        WEFT_TRY(fit_solve(coarse, (fit_scope){.first = light, .n = 1, .runs = 2}, err));
         candidate one = {.lamp = coarse->lamps[light]};
         one.cost = level(coarse, light, &one.lamp);
         if (one.cost < winner.cost)

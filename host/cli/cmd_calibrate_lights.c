@@ -13,8 +13,8 @@
 #include <string.h>
 
 typedef struct lights_args {
-    const char *output, *guess;
-    double reflectance;
+    const char *output, *guess, *positions;
+    double reflectance, sigma_mm, height_mm;
     weft_size grid;
 } lights_args;
 
@@ -32,6 +32,27 @@ static const weft_field fields[] = {
      .unit = "FILE",
      .help =
          "rough positions: CSV with x_mm,y_mm,z_mm a light, or a calibration; else they are searched for"},
+    {.key = "positions",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lights_args, positions),
+     .unit = "FILE",
+     .help = "measured positions, in the same form: the fit weighs them by --positions-sigma"},
+    {.key = "positions-sigma",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(lights_args, sigma_mm),
+     .unit = "mm",
+     .min = 0.01,
+     .max = 1000,
+     .def = "3",
+     .help = "how far each coordinate of --positions may be off (standard deviation)"},
+    {.key = "sheet-height",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(lights_args, height_mm),
+     .unit = "mm",
+     .min = -100,
+     .max = 100,
+     .def = "0",
+     .help = "of the sheet's surface over the plane of --board-on-table"},
     {.key = "reflectance",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(lights_args, reflectance),
@@ -98,10 +119,15 @@ static weft_err make_options(const lights_args *args, weft_light_fit_options *op
         options->grid_rows > 512)
         return weft_fail(err, WEFT_ERR_USAGE, "--grid %dx%d: wanted 4 to 512 nodes each way",
                          args->grid.width, args->grid.height);
-    if (!args->guess)
+    options->sheet_height_mm = args->height_mm;
+    if (args->guess && args->positions)
+        return weft_fail(err, WEFT_ERR_USAGE, "--guess and --positions: give one of them");
+    const char *const file = args->positions ? args->positions : args->guess;
+    if (!file)
         return WEFT_OK;
-    return weft_folder_exists(args->guess) ? guess_from_calibration(args->guess, options, err)
-                                           : guess_from_csv(args->guess, options, err);
+    options->guess_sigma_mm = args->positions ? args->sigma_mm : 0;
+    return weft_folder_exists(file) ? guess_from_calibration(file, options, err)
+                                    : guess_from_csv(file, options, err);
 }
 
 static weft_err add_light(const weft_set *set, int light, const weft_plate *ambient, weft_white_sheet *sheet,
@@ -139,6 +165,20 @@ static weft_err load_sheet(const weft_set *set, weft_white_sheet *sheet, weft_er
     return status;
 }
 
+static json_t *sigma_json(const weft_light_sigma *s)
+{
+    return json_pack("{s:o, s:f, s:f, s:o, s:f}", "position_mm", weft_json_numbers(s->position_mm, 3),
+                     "aim_rad", s->aim_rad, "exponent", s->exponent, "intensity",
+                     weft_json_numbers(s->intensity, 3), "irradiance", s->irradiance);
+}
+
+static json_t *sheet_json(const weft_light_sheet *s)
+{
+    return json_pack("{s:o, s:o, s:o, s:o, s:b}", "bow_mm", weft_json_numbers(s->bow_mm, 2), "bow_sigma_mm",
+                     weft_json_numbers(s->bow_sigma_mm, 2), "tilt_rad", weft_json_numbers(s->tilt_rad, 2),
+                     "tilt_sigma_rad", weft_json_numbers(s->tilt_sigma_rad, 2), "bow_used", (int)s->bow_used);
+}
+
 static json_t *report_json(const weft_set *set, const lights_args *args, const weft_calibration *cal,
                            const weft_light_fit_report *r)
 {
@@ -147,17 +187,40 @@ static json_t *report_json(const weft_set *set, const lights_args *args, const w
         json_array_append_new(
             rounds, json_pack("{s:f, s:f}", "moved_mm", r->rounds[i].moved_mm, "rms", r->rounds[i].rms));
     for (int l = 0; l < cal->n_lights; l++)
-        json_array_append_new(lights, json_pack("{s:f, s:f, s:f, s:f}", "position_sigma_mm",
-                                                cal->lights[l].position_sigma_mm, "residual",
-                                                cal->lights[l].residual, "residual_without_grid",
-                                                r->model_rms[l], "left_out", r->left_out[l]));
+        json_array_append_new(lights,
+                              json_pack("{s:f, s:f, s:f, s:f, s:o}", "position_sigma_mm",
+                                        cal->lights[l].position_sigma_mm, "residual", cal->lights[l].residual,
+                                        "residual_without_grid", r->model_rms[l], "left_out", r->left_out[l],
+                                        "sigma", sigma_json(&r->sigma[l])));
     json_t *const report = json_pack(
         "{s:s, s:f, s:b, s:o, s:f, s:o, s:o, s:o}", "set", set->folder, "reflectance", args->reflectance,
         "settled", (int)r->settled, "rounds", rounds, "mean_exponent", r->exponent, "vignetting",
         weft_json_numbers(r->vignetting, 3), "slope", weft_json_numbers(r->slope, 2), "lights", lights);
+    if (report) {
+        json_object_set_new(report, "model_error", json_real(r->model_error));
+        json_object_set_new(report, "sheet", sheet_json(&r->sheet));
+        json_object_set_new(report, "sheet_height_mm", json_real(args->height_mm));
+    }
     if (report && args->guess)
         json_object_set_new(report, "guess", json_string(args->guess));
+    if (report && args->positions) {
+        json_object_set_new(report, "positions", json_string(args->positions));
+        json_object_set_new(report, "positions_sigma_mm", json_real(args->sigma_mm));
+    }
     return report;
+}
+
+static void print_sheet(const weft_invocation *inv, const weft_light_sheet *s)
+{
+    const double degrees = 57.29577951308232;
+    if (!(s->bow_sigma_mm[0] > 0))
+        return;
+    fprintf(inv->out,
+            "the sheet: bowed by %.3f +- %.3f mm across, %.3f +- %.3f mm up (%s); tilted by %.2f +- %.2f, "
+            "%.2f +- %.2f degrees\n",
+            s->bow_mm[0], s->bow_sigma_mm[0], s->bow_mm[1], s->bow_sigma_mm[1],
+            s->bow_used ? "taken into account" : "not certain: taken as flat", s->tilt_rad[0] * degrees,
+            s->tilt_sigma_rad[0] * degrees, s->tilt_rad[1] * degrees, s->tilt_sigma_rad[1] * degrees);
 }
 
 static weft_err print_result(const weft_invocation *inv, const lights_args *args, const weft_calibration *cal,
@@ -177,8 +240,12 @@ static weft_err print_result(const weft_invocation *inv, const lights_args *args
                 t->position.x, t->position.y, t->position.z, t->position_sigma_mm, t->exponent,
                 t->intensity[0], t->intensity[1], t->intensity[2], 100 * t->residual, 100 * r->model_rms[l]);
     }
-    fprintf(inv->out, "%s after %d rounds, last move %.3f mm\n", r->settled ? "settled" : "not settled",
-            r->n_rounds, r->rounds[r->n_rounds - 1].moved_mm);
+    for (int i = 0; i < r->n_rounds; i++)
+        fprintf(inv->out, "round %d: lights moved by %.3f mm at most, measured/model off by %.3f %% rms\n",
+                i + 1, r->rounds[i].moved_mm, 100 * r->rounds[i].rms);
+    fprintf(inv->out, "%s after %d rounds; what the model misses smoothly: %.3f %%\n",
+            r->settled ? "settled" : "not settled", r->n_rounds, 100 * r->model_error);
+    print_sheet(inv, &r->sheet);
     return WEFT_OK;
 }
 
@@ -206,6 +273,12 @@ static weft_err fit(const weft_invocation *inv, const lights_args *args, const w
     if (status != WEFT_OK)
         return weft_prefix(err, status, "%s", set->folder);
     keep_measured_white(&former, cal);
+    if (report.sheet.bow_used)
+        weft_warn(
+            "%s: the sheet is not flat: its middle stands %.2f mm over the left and right edge, %.2f mm over "
+            "the "
+            "upper and lower; this is taken into account, but a flat sheet makes the lights more certain",
+            set->folder, report.sheet.bow_mm[0], report.sheet.bow_mm[1]);
     if (!report.settled)
         weft_warn("the lights still moved by %.2f mm in the last round; the sheet may be uneven",
                   report.rounds[report.n_rounds - 1].moved_mm);
