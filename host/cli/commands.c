@@ -10,6 +10,7 @@ extern const weft_command weft_cmd_calibrate_lights;
 extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_devices;
+extern const weft_command weft_cmd_doctor;
 extern const weft_command weft_cmd_flash;
 extern const weft_command weft_cmd_import;
 extern const weft_command weft_cmd_rig;
@@ -28,6 +29,7 @@ extern const weft_command weft_cmd_preview;
 const weft_command *const weft_commands[] = {
     &weft_cmd_rig,
     &weft_cmd_devices,
+    &weft_cmd_doctor,
     &weft_cmd_flash,
     &weft_cmd_light_on,
     &weft_cmd_light_level,
