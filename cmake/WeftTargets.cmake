@@ -49,7 +49,7 @@ function(weft_test_properties name timeout serial)
     set(timeout 120)
   endif()
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT ${timeout}
-    ENVIRONMENT "WEFT_TEST_BIN=${CMAKE_BINARY_DIR}/bin;WEFT_TEST_SOURCE=${CMAKE_SOURCE_DIR};WEFT_TEST_BUILD=${CMAKE_BINARY_DIR};ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;OPENBLAS_NUM_THREADS=1")
+    ENVIRONMENT "WEFT_SOCKET=none;WEFT_TEST_BIN=${CMAKE_BINARY_DIR}/bin;WEFT_TEST_SOURCE=${CMAKE_SOURCE_DIR};WEFT_TEST_BUILD=${CMAKE_BINARY_DIR};ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;OPENBLAS_NUM_THREADS=1")
   if(serial)
     set_tests_properties(${name} PROPERTIES RESOURCE_LOCK rig)
   endif()

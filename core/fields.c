@@ -169,6 +169,8 @@ typedef struct parse {
     void *const *args;
     int n_tables, argc, at;
     char *const *argv;
+    weft_fields_visit_fn *visit; /* NULL: values go into the structs */
+    void *context;
 } parse;
 
 static const weft_field *find_long(const parse *p, const char *key, size_t n, void **args)
@@ -176,7 +178,7 @@ static const weft_field *find_long(const parse *p, const char *key, size_t n, vo
     for (int t = 0; t < p->n_tables; t++)
         for (const weft_field *f = p->tables[t]; f && f->key; f++)
             if (strlen(f->key) == n && memcmp(f->key, key, n) == 0) {
-                *args = p->args[t];
+                *args = p->args ? p->args[t] : NULL;
                 return f;
             }
     return NULL;
@@ -187,7 +189,7 @@ static const weft_field *find_short(const parse *p, char letter, void **args)
     for (int t = 0; t < p->n_tables; t++)
         for (const weft_field *f = p->tables[t]; f && f->key; f++)
             if (f->short_opt == letter) {
-                *args = p->args[t];
+                *args = p->args ? p->args[t] : NULL;
                 return f;
             }
     return NULL;
@@ -210,6 +212,12 @@ static weft_err unknown(const parse *p, const char *word, weft_error *err)
     return weft_fail(err, WEFT_ERR_USAGE, "%s: no such option; --help lists them", word);
 }
 
+static weft_err take_value(const parse *p, const weft_field *field, const char *text, void *args,
+                           weft_error *err)
+{
+    return p->visit ? p->visit(p->context, field, text, err) : weft_field_parse(field, text, args, err);
+}
+
 static weft_err parse_option(parse *p, weft_error *err)
 {
     const char *const word = p->argv[p->at];
@@ -229,7 +237,7 @@ static weft_err parse_option(parse *p, weft_error *err)
     if (field->type == WEFT_FIELD_FLAG) {
         if (value)
             return weft_fail(err, WEFT_ERR_USAGE, "%s: takes no value", word);
-        return weft_field_parse(field, "", args, err);
+        return take_value(p, field, "", args, err);
     }
     if (!value) {
         if (p->at + 1 >= p->argc)
@@ -237,7 +245,7 @@ static weft_err parse_option(parse *p, weft_error *err)
                              field->unit ? field->unit : "VALUE");
         value = p->argv[++p->at];
     }
-    return weft_field_parse(field, value, args, err);
+    return take_value(p, field, value, args, err);
 }
 
 static bool given(const weft_field *field, void *args)
@@ -261,7 +269,7 @@ static bool given(const weft_field *field, void *args)
 weft_err weft_fields_parse_argv(const weft_field *const *tables, void *const *args, int n_tables, int argc,
                                 char *const *argv, const char **operands, int *n_operands, weft_error *err)
 {
-    parse p = {tables, args, n_tables, argc, 0, argv};
+    parse p = {.tables = tables, .args = args, .n_tables = n_tables, .argc = argc, .argv = argv};
     bool options = true;
     *n_operands = 0;
     for (; p.at < argc; p.at++) {
@@ -277,6 +285,28 @@ weft_err weft_fields_parse_argv(const weft_field *const *tables, void *const *ar
         for (const weft_field *f = tables[t]; f && f->key; f++)
             if (f->required && !given(f, args[t]))
                 return weft_fail(err, WEFT_ERR_USAGE, "--%s is needed: %s", f->key, f->help);
+    return WEFT_OK;
+}
+
+weft_err weft_fields_visit_argv(const weft_field *const *tables, int n_tables, int argc, char *const *argv,
+                                weft_fields_visit_fn *visit, void *context, weft_error *err)
+{
+    parse p = {.tables = tables,
+               .n_tables = n_tables,
+               .argc = argc,
+               .argv = argv,
+               .visit = visit,
+               .context = context};
+    bool options = true;
+    for (; p.at < argc; p.at++) {
+        const char *const word = argv[p.at];
+        if (options && strcmp(word, "--") == 0)
+            options = false;
+        else if (options && word[0] == '-' && word[1] != '\0')
+            WEFT_TRY(parse_option(&p, err));
+        else
+            WEFT_TRY(visit(context, NULL, word, err));
+    }
     return WEFT_OK;
 }
 

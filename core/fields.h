@@ -73,6 +73,14 @@ weft_err weft_field_parse(const weft_field *field, const char *text, void *args,
 weft_err weft_fields_parse_argv(const weft_field *const *tables, void *const *args, int n_tables, int argc,
                                 char *const *argv, const char **operands, int *n_operands, weft_error *err);
 
+/** One option of a command line, or an operand (`field` is NULL).  `text` is "" for a flag. */
+typedef weft_err weft_fields_visit_fn(void *context, const weft_field *field, const char *text,
+                                      weft_error *err);
+
+/** Goes over a command line as weft_fields_parse_argv() does, in its order, without taking anything in. */
+weft_err weft_fields_visit_argv(const weft_field *const *tables, int n_tables, int argc, char *const *argv,
+                                weft_fields_visit_fn *visit, void *context, weft_error *err);
+
 /** Prints the rows as the option part of a help text. */
 void weft_fields_print_help(const weft_field *fields, FILE *out);
 

@@ -5,6 +5,7 @@
 #include "core/mem.h"
 #include "core/sha256.h"
 #include "host/capture/auto_exposure.h"
+#include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
 
@@ -384,8 +385,10 @@ static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_err
         status = shoot_until_good(run, frame, &shot, retries, err);
     if (status == WEFT_OK && !(capture = describe_shot(run, frame, &shot, retries)))
         status = weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the record of %s", frame->file);
-    if (status == WEFT_OK)
+    if (status == WEFT_OK) {
+        weft_live_picture_report(frame->file, &run->shooter.frame.mosaic);
         status = keep_frame_awake(run, frame, capture, err);
+    }
     json_decref(capture);
     json_decref(retries);
     WEFT_TRY(status);

@@ -5,6 +5,7 @@
 #include "core/progress.h"
 #include "core/report.h"
 #include "core/version.h"
+#include "host/cli/remote.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -157,12 +158,25 @@ static weft_err check_operand_count(const weft_command *command, int n, weft_err
     return WEFT_OK;
 }
 
+/* Here, or in the daemon that owns the scanner; then *exit_status is the command's there. */
+static weft_err run_here_or_there(const weft_command *command, int argc, char **argv,
+                                  const weft_invocation *inv, const void *args, int *exit_status,
+                                  weft_error *err)
+{
+    char socket[108];
+    bool there;
+    WEFT_TRY(weft_remote_wanted(command, socket, &there, err));
+    return there ? weft_remote_run(command, argc, argv, inv, socket, exit_status, err)
+                 : command->run(inv, args, err);
+}
+
 static int run_command(const weft_command *command, int argc, char **argv)
 {
     weft_error error = {0};
     common_args common = {0};
     weft_invocation inv = {.out = stdout};
     weft_err status = WEFT_ERR_NOMEM;
+    int there_status = 0;
     void *const args = weft_alloc(1, command->args_size, &error);
     const char **const operands = weft_alloc((size_t)argc + 1, sizeof *operands, &error);
     if (args && operands) {
@@ -187,11 +201,11 @@ static int run_command(const weft_command *command, int argc, char **argv)
                 inv.json = common.json;
                 inv.force = common.force;
                 weft_cancel_on_signals();
-                status = command->run(&inv, args, &error);
+                status = run_here_or_there(command, argc, argv, &inv, args, &there_status, &error);
             }
         }
     }
-    const int exit_status = report(command, status, &error);
+    const int exit_status = status == WEFT_OK ? there_status : report(command, status, &error);
     weft_free(operands);
     weft_free(args);
     return exit_status;

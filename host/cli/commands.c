@@ -20,6 +20,7 @@ extern const weft_command weft_cmd_light_on;
 extern const weft_command weft_cmd_light_run;
 extern const weft_command weft_cmd_light_set;
 extern const weft_command weft_cmd_light_status;
+extern const weft_command weft_cmd_live;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_preview;
@@ -37,6 +38,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_light_run,
     &weft_cmd_light_set,
     &weft_cmd_light_status,
+    &weft_cmd_live,
     &weft_cmd_capture,
     &weft_cmd_calibrate_lens,
     &weft_cmd_calibrate_linearity,

@@ -133,7 +133,7 @@ static weft_err take_option(parse *p, const char *key, const json_t *value, weft
 {
     char text[MAX_TEXT + 2];
     const weft_field *const field = find_field(p->command, key);
-    if (!field || strcmp(key, "json") == 0 || strcmp(key, "help") == 0 || strcmp(key, "resume") == 0)
+    if (!field || strcmp(key, "json") == 0 || strcmp(key, "help") == 0)
         return weft_fail(err, WEFT_ERR_USAGE, "\"%.40s\" is no option of %s%s", key, p->command->name,
                          field ? " for a job" : "");
     if (weft_job_kind_is_device(key) && !p->rights->own_user)

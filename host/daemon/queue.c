@@ -26,7 +26,7 @@ enum {
     KEEP_JOBS = 2000
 };
 #define GRACE_S 10.0 /* between the request to end and SIGKILL */
-#define HOLD_S  10.0 /* for the one who wants to hold a job to come */
+#define HOLD_S  5.0 /* for the one who wants to hold a job to come */
 
 typedef struct running_job {
     weft_queue *queue; /* NULL: free */

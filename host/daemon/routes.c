@@ -20,6 +20,9 @@ const weft_route weft_routes[] = {
     {"POST",   "/v1/jobs/{id}/cancel", "cancelJob",      weft_route_job_cancel,      false},
     {"POST",   "/v1/jobs/{id}/resume", "resumeJob",      weft_route_job_resume,      false},
     {"GET",    "/v1/events",           "watchEvents",    weft_route_events,          false},
+    {"GET",    "/v1/live",             "getLive",        weft_route_live,            false},
+    {"GET",    "/v1/live.jpg",         "getLivePicture", weft_route_live_picture,    false},
+    {"GET",    "/v1/live.mjpg",        "watchLive",      weft_route_live_stream,     false},
     {0},
 };
 /* clang-format on */

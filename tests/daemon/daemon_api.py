@@ -100,6 +100,9 @@ def exercise(d):
             d.wait(failed["id"])
     for number in (failed["id"], 12345):
         yield "DELETE", "/v1/jobs/{id}", d.request("DELETE", f"/v1/jobs/{number}")
+    for path in ("/v1/live", "/v1/live.jpg"):
+        yield "GET", path, d.get(path)
+    yield "GET", "/v1/live.mjpg", d.get("/v1/live.mjpg?rate=99")
     for query in ("?job=12345", "?job=0", "?log=x"):
         yield "GET", "/v1/events", d.get("/v1/events" + query)
     for method, path in routes_of_the_server():

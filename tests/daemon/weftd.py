@@ -1,4 +1,6 @@
 """A daemon under test: its process, requests over its socket, its events.  Used by the tests beside it."""
+import fcntl
+import hashlib
 import http.client
 import json
 import os
@@ -228,3 +230,58 @@ def run_tests(namespace):
             failed += 1
         sys.stdout.flush()
     sys.exit(failed > 0)
+
+
+class Rig:
+    """The virtual scanner; one at a time on a machine (it needs UDP port 3956)."""
+
+    def __init__(self, folder, sample="twill", size="616x408", **more):
+        self.folder, self.words = os.path.join(folder, "rig"), ["--sample", sample, "--size", size]
+        for key, value in more.items():
+            self.words += [f"--{key.replace('_', '-')}", str(value)]
+
+    def __enter__(self):
+        if not os.path.exists(f"{BIN}/weft-rig"):
+            print("skipped: this build has no weft-rig")
+            sys.exit(77)
+        self.lock = open("/tmp/weft-rig.lock", "a", encoding="utf-8")
+        fcntl.flock(self.lock, fcntl.LOCK_EX)
+        self.process = subprocess.Popen([f"{BIN}/weft-rig", "--quiet", "--dir", self.folder, *self.words],
+                                        stdout=subprocess.PIPE)
+        line = self.process.stdout.readline()
+        assert line, "weft-rig does not start"
+        self.ready = json.loads(line)
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(30)
+        self.process.stdout.close()
+        self.lock.close()
+
+    def tell(self, line):
+        told = subprocess.run([f"{BIN}/weft", "rig", "--dir", self.folder, "--tell", line], capture_output=True,
+                              text=True, check=True)
+        return json.loads(told.stdout)
+
+    def wait_dark(self, within_s):
+        """Seconds of waiting until all lamps are dark."""
+        begin = time.monotonic()
+        while self.tell("state")["lights_on"]:
+            assert time.monotonic() - begin < within_s, f"lamps are on after {within_s} s: {self.tell('state')}"
+            time.sleep(0.01)
+        return time.monotonic() - begin
+
+
+def check_set(folder, state="complete", at_least=11):
+    """Every frame that set.json lists is there with its hash; nothing else is, but one that was just written."""
+    with open(f"{folder}/set.json", encoding="utf-8") as text:
+        found = json.load(text)
+    assert found["state"] == state and len(found["frames"]) >= at_least, (found["state"], len(found["frames"]))
+    for frame in found["frames"]:
+        with open(f"{folder}/{frame['file']}", "rb") as dng:
+            assert hashlib.sha256(dng.read()).hexdigest() == frame["sha256"], frame["file"]
+    names = {name for name in os.listdir(folder) if not name.startswith(".weft-")}
+    extra = names - {frame["file"] for frame in found["frames"]} - {"set.json"}
+    assert len(extra) <= (state != "complete"), extra
+    return found
