@@ -195,20 +195,35 @@ static weft_err read_opened(libraw_data_t *raw, const char *path, const bool *da
     return WEFT_OK;
 }
 
-weft_err weft_raw_read(const char *path, weft_mosaic *mosaic, weft_frame_info *info, weft_error *err)
+/* @param bytes  NULL: open the file `path` */
+static weft_err read_raw(const char *path, const void *bytes, size_t n, weft_mosaic *mosaic,
+                         weft_frame_info *info, weft_error *err)
 {
-    uint64_t size;
     bool damaged = false;
-    WEFT_TRY(weft_file_size(path, &size, err));
-    WEFT_TRY(weft_dng_check_extent(path, err));
     libraw_data_t *const raw = libraw_init(0);
     if (!raw)
         return weft_fail(err, WEFT_ERR_NOMEM, "%s: no memory for LibRaw", path);
     libraw_set_dataerror_handler(raw, on_damaged_data, &damaged); /* both print to stderr by default */
     libraw_set_memerror_handler(raw, on_no_memory, NULL);
-    const int code = libraw_open_file(raw, path);
+    const int code = bytes
+                         ? libraw_open_buffer(raw, (void *)(uintptr_t)bytes, n) /* which it does not change */
+                         : libraw_open_file(raw, path);
     const weft_err status = code != LIBRAW_SUCCESS ? libraw_failed(path, code, err)
                                                    : read_opened(raw, path, &damaged, mosaic, info, err);
     libraw_close(raw);
     return status;
+}
+
+weft_err weft_raw_read(const char *path, weft_mosaic *mosaic, weft_frame_info *info, weft_error *err)
+{
+    uint64_t size;
+    WEFT_TRY(weft_file_size(path, &size, err));
+    WEFT_TRY(weft_dng_check_extent(path, err));
+    return read_raw(path, NULL, 0, mosaic, info, err);
+}
+
+weft_err weft_raw_read_bytes(const char *name, const void *bytes, size_t n, weft_mosaic *mosaic,
+                             weft_frame_info *info, weft_error *err)
+{
+    return read_raw(name, bytes, n, mosaic, info, err);
 }

@@ -13,6 +13,11 @@
  */
 weft_err weft_raw_read(const char *path, weft_mosaic *mosaic, weft_frame_info *info, weft_error *err);
 
+/** As weft_raw_read() for a file in memory, called `name` in messages.  A DNG whose end is missing is not
+ *  noticed when only tags were cut. */
+weft_err weft_raw_read_bytes(const char *name, const void *bytes, size_t n, weft_mosaic *mosaic,
+                             weft_frame_info *info, weft_error *err);
+
 /** Whether the name ends like a raw file that LibRaw may read (.dng .nef .cr2 .arw ...). */
 bool weft_raw_is_name(const char *path);
 

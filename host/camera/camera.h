@@ -49,10 +49,11 @@ typedef struct weft_camera_settings {
 /** What the device really set, and what its frames are like. */
 typedef struct weft_camera_state {
     char id[128], vendor[64], model[64], serial[64];
-    int width, height, bits;
+    int width, height, bits; /* 0 until it is configured, when only a frame tells (DSLRs) */
     weft_cfa cfa;
     double black[4], white; /* DN */
     double exposure_s, gain;
+    char suffix[8]; /* ".nef" when frames come as the camera's own files; "" when they come as samples */
 } weft_camera_state;
 
 typedef enum weft_frame_status {
@@ -62,14 +63,25 @@ typedef enum weft_frame_status {
     WEFT_FRAME_ABORTED,    /* the backend's process ended; not for backends */
 } weft_frame_status;
 
+/** A raw file as the camera wrote it. */
+typedef struct weft_camera_file {
+    uint8_t *bytes;
+    size_t size;    /* 0: none */
+    char suffix[8]; /* ".nef" */
+} weft_camera_file;
+
 typedef struct weft_captured_frame {
     weft_frame_status status;
-    char reason[128];        /* in words, when not complete */
-    weft_mosaic mosaic;      /* owned by the caller; valid only when complete.  Zeroed before the first use;
-                                the memory is used again by the next frame of the same size */
-    uint64_t sequence;       /* the camera's own count of frames */
+    char reason[128];      /* in words, when not complete */
+    weft_mosaic mosaic;    /* owned by the caller; valid only when complete.  Zeroed before the first use;
+                              the memory is used again by the next frame of the same size */
+    weft_camera_file file; /* what `mosaic` was decoded from, to be kept instead of a DNG; the caller's too */
+    uint64_t sequence;     /* the camera's own count of frames */
     double exposure_s, gain; /* achieved */
 } weft_captured_frame;
+
+/** Frees what a frame holds; `{0}` is fine. */
+void weft_captured_frame_fini(weft_captured_frame *frame);
 
 /** Called at least ten times a second while a backend waits for a frame, from the waiting thread: renews a
  *  lease, looks for a cancellation.  Anything but WEFT_OK ends the wait with that status. */

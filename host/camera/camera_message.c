@@ -125,17 +125,23 @@ weft_camera_receipt weft_camera_message_receive(int socket, int timeout_ms, weft
     return WEFT_RECEIPT_MESSAGE;
 }
 
-int weft_camera_sealed_memory(const void *bytes, size_t n)
+static bool write_all(int fd, const char *bytes, size_t n)
+{
+    while (n > 0) {
+        const ssize_t written = write(fd, bytes, n);
+        if (written < 0 && errno != EINTR)
+            return false;
+        bytes += written > 0 ? written : 0;
+        n -= written > 0 ? (size_t)written : 0;
+    }
+    return true;
+}
+
+int weft_camera_sealed_memory(const void *bytes, size_t n, const void *more, size_t n_more)
 {
     const int fd = memfd_create("weft-frame", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-    size_t done = 0;
-    while (fd >= 0 && done < n) {
-        const ssize_t written = write(fd, (const char *)bytes + done, n - done);
-        if (written < 0 && errno != EINTR)
-            break;
-        done += written > 0 ? (size_t)written : 0;
-    }
-    if (fd >= 0 && (done < n || fcntl(fd, F_ADD_SEALS, all_seals) != 0)) {
+    if (fd >= 0 && (!write_all(fd, bytes, n) || !write_all(fd, more, n_more) ||
+                    fcntl(fd, F_ADD_SEALS, all_seals) != 0)) {
         const int reason = errno;
         close(fd);
         errno = reason;

@@ -10,7 +10,8 @@
  *     helper -> program   ARMED, before the answer to EXPOSE, when the frame waits for a pulse on a wire
  *     program -> helper   CANCEL, while EXPOSE is under way; the answer comes all the same
  *
- * A frame's samples travel beside the answer to EXPOSE as a memfd that is sealed against every change.
+ * A frame's samples, and behind them the camera's own file where it has one, travel beside the answer to
+ * EXPOSE as a memfd that is sealed against every change.
  */
 #ifndef WEFT_HOST_CAMERA_MESSAGE_H
 #define WEFT_HOST_CAMERA_MESSAGE_H
@@ -26,6 +27,9 @@
 #define WEFT_CAMERA_HELPER_FD 3
 
 enum { WEFT_CAMERA_MESSAGE_MAX_FOUND = 32 };
+
+/** Refused above this: raw files of the largest backs have 400 MB. */
+#define WEFT_CAMERA_MAX_FILE ((size_t)1 << 29)
 
 typedef enum weft_camera_call {
     WEFT_CALL_HELLO,
@@ -54,7 +58,7 @@ typedef struct weft_camera_message {
         weft_camera_settings wanted; /* CONFIGURE */
         double deadline_s;           /* EXPOSE */
         weft_camera_state state;     /* answer to OPEN and CONFIGURE */
-        weft_captured_frame frame;   /* answer to EXPOSE; mosaic.data means nothing */
+        weft_captured_frame frame;   /* answer to EXPOSE; its pointers mean nothing */
         weft_error error;            /* any answer that is a failure */
         struct {                     /* answer to LIST */
             int32_t n;
@@ -89,8 +93,8 @@ bool weft_camera_message_send(int socket, const weft_camera_message *message, si
 weft_camera_receipt weft_camera_message_receive(int socket, int timeout_ms, weft_camera_message *message,
                                                 int *fd);
 
-/** A memfd with these bytes, sealed; -1 with errno when there is none. */
-int weft_camera_sealed_memory(const void *bytes, size_t n);
+/** A memfd with these bytes and then those, sealed; -1 with errno when there is none. */
+int weft_camera_sealed_memory(const void *bytes, size_t n, const void *more, size_t n_more);
 
 /** Whether fd is memory of exactly n bytes that nobody can change any more. */
 bool weft_camera_is_sealed_memory(int fd, size_t n);

@@ -1,6 +1,7 @@
 #include "host/camera/camera_remote.h"
 
 #include "core/log.h"
+#include "core/mem.h"
 #include "core/progress.h"
 
 #include <errno.h>
@@ -38,12 +39,16 @@ static weft_err call(weft_camera_remote *r, const weft_camera_wait *wait, weft_c
     return status;
 }
 
-static weft_err check_state(const weft_camera_remote *r, weft_camera_state *s, weft_error *err)
+/* The size of frames may be unknown until the camera is configured. */
+static weft_err check_state(const weft_camera_remote *r, weft_camera_state *s, bool configured,
+                            weft_error *err)
 {
     char *const texts[] = {s->vendor, s->model, s->serial};
     for (int i = 0; i < 3; i++)
         texts[i][sizeof s->vendor - 1] = '\0';
-    s->id[sizeof s->id - 1] = '\0';
+    s->id[sizeof s->id - 1] = s->suffix[sizeof s->suffix - 1] = '\0';
+    if (s->width == 0 && s->height == 0 && s->exposure_s > 0 && s->gain > 0 && !configured)
+        return WEFT_OK;
     if (s->width < 2 || s->height < 2 || s->width > WEFT_IMAGE_MAX_SIDE || s->height > WEFT_IMAGE_MAX_SIDE ||
         s->bits < 1 || s->bits > 16 || s->cfa > WEFT_CFA_BGGR || !(s->white > 0 && s->white <= 65535) ||
         !(s->exposure_s > 0) || !(s->gain > 0))
@@ -68,7 +73,7 @@ static weft_err open_anew(weft_camera_remote *r, const weft_camera_wait *wait, w
     snprintf(m.body.address, sizeof m.body.address, "%s", r->address);
     status = call(r, &patient, &m, sizeof m.body.address, NULL, err);
     if (status == WEFT_OK)
-        status = check_state(r, &m.body.state, err);
+        status = check_state(r, &m.body.state, false, err);
     if (status == WEFT_OK)
         r->info = m.body.state;
     else
@@ -104,7 +109,7 @@ static weft_err tell(weft_camera_remote *r, const weft_camera_wait *wait, const 
     patient.deadline_s = patience_s(CONFIGURE_S);
     patient.polite = false;
     WEFT_TRY(call(r, &patient, &m, sizeof m.body.wanted, NULL, err));
-    WEFT_TRY(check_state(r, &m.body.state, err));
+    WEFT_TRY(check_state(r, &m.body.state, true, err));
     r->info = m.body.state;
     return WEFT_OK;
 }
@@ -177,16 +182,21 @@ weft_err weft_camera_remote_configure(weft_camera_remote *r, const weft_camera_w
 
 /* ---- frames ---- */
 
-static weft_err read_all(int fd, void *to, size_t n, weft_error *err)
+static weft_err read_all(int fd, size_t from, void *to, size_t n, weft_error *err)
 {
     size_t done = 0;
     while (done < n) {
-        const ssize_t got = pread(fd, (char *)to + done, n - done, (off_t)done);
+        const ssize_t got = pread(fd, (char *)to + done, n - done, (off_t)(from + done));
         if (got == 0 || (got < 0 && errno != EINTR))
             return weft_fail_errno(err, WEFT_ERR_IO, "the memory of a frame cannot be read");
         done += got > 0 ? (size_t)got : 0;
     }
     return WEFT_OK;
+}
+
+static size_t sample_bytes(const weft_captured_frame *frame)
+{
+    return sizeof *frame->mosaic.data * (size_t)frame->mosaic.width * (size_t)frame->mosaic.height;
 }
 
 /* Takes over what the helper says of the frame, and its samples; false when they do not belong together. */
@@ -196,8 +206,25 @@ static bool fits(const weft_camera_remote *r, const weft_captured_frame *said, i
         return fd < 0 && said->reason[0];
     return said->status == WEFT_FRAME_COMPLETE && said->mosaic.width == r->info.width &&
            said->mosaic.height == r->info.height && said->mosaic.cfa <= WEFT_CFA_BGGR &&
-           said->exposure_s > 0 && said->gain > 0 &&
-           weft_camera_is_sealed_memory(fd, (size_t)2 * (size_t)r->info.width * (size_t)r->info.height);
+           said->exposure_s > 0 && said->gain > 0 && said->file.size <= WEFT_CAMERA_MAX_FILE &&
+           weft_camera_is_sealed_memory(fd, sample_bytes(said) + said->file.size);
+}
+
+/* The camera's own file lies behind the samples. */
+static weft_err take_file(const weft_captured_frame *said, int fd, weft_camera_file *file, weft_error *err)
+{
+    if (said->file.size == 0) {
+        weft_free(file->bytes);
+        *file = (weft_camera_file){0};
+        return WEFT_OK;
+    }
+    uint8_t *const bytes = weft_realloc(file->bytes, said->file.size, 1, err);
+    if (!bytes)
+        return WEFT_ERR_NOMEM;
+    *file = said->file;
+    file->bytes = bytes;
+    file->suffix[sizeof file->suffix - 1] = '\0';
+    return read_all(fd, sample_bytes(said), bytes, file->size, err);
 }
 
 static weft_err take_over(const weft_captured_frame *said, int fd, weft_captured_frame *frame,
@@ -205,6 +232,7 @@ static weft_err take_over(const weft_captured_frame *said, int fd, weft_captured
 {
     weft_mosaic *const m = &frame->mosaic;
     weft_mosaic kept = *m;
+    weft_camera_file file;
     if (said->status == WEFT_FRAME_COMPLETE) {
         const weft_mosaic *const s = &said->mosaic;
         if (!kept.data || kept.width != s->width || kept.height != s->height) {
@@ -212,13 +240,16 @@ static weft_err take_over(const weft_captured_frame *said, int fd, weft_captured
             WEFT_TRY(weft_mosaic_init(m, s->width, s->height, s->cfa, err));
             kept = *m;
         }
-        WEFT_TRY(read_all(fd, kept.data, sizeof *kept.data * (size_t)s->width * (size_t)s->height, err));
+        WEFT_TRY(read_all(fd, 0, kept.data, sample_bytes(said), err));
+        WEFT_TRY(take_file(said, fd, &frame->file, err));
         uint16_t *const data = kept.data;
         kept = *s;
         kept.data = data;
     }
+    file = frame->file;
     *frame = *said;
     frame->mosaic = kept;
+    frame->file = file;
     return WEFT_OK;
 }
 

@@ -174,7 +174,8 @@ static int share_frame(const server *s, weft_camera_deed deed)
             errno = EIO; /* it is refused all the same */
         return fd;
     }
-    return weft_camera_sealed_memory(m->data, deed == WEFT_DEED_SHORT ? bytes / 2 : bytes);
+    return weft_camera_sealed_memory(m->data, deed == WEFT_DEED_SHORT ? bytes / 2 : bytes,
+                                     s->frame.file.bytes, s->frame.file.size);
 }
 
 static weft_err expose(server *s, weft_camera_deed deed, size_t *body_size, int *fd, weft_error *err)
@@ -190,6 +191,7 @@ static weft_err expose(server *s, weft_camera_deed deed, size_t *body_size, int 
     }
     s->message.body.frame = s->frame;
     s->message.body.frame.mosaic.data = NULL;
+    s->message.body.frame.file.bytes = NULL;
     *body_size = sizeof s->frame;
     return WEFT_OK;
 }
@@ -260,7 +262,7 @@ int weft_camera_serve(const weft_camera_backend *backend, int socket)
     }
     const bool in_order = atomic_load(&leaving);
     close_camera(s);
-    weft_mosaic_fini(&s->frame.mosaic);
+    weft_captured_frame_fini(&s->frame);
     pthread_join(watcher, NULL); /* until the program has hung up */
     weft_free(s);
     return in_order ? 0 : 1;

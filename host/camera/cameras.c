@@ -9,6 +9,7 @@
 
 const weft_camera_kind weft_camera_kinds[] = {
     {"aravis", "GigE Vision and USB3 Vision cameras (Aravis)"},
+    {"gphoto", "still cameras over USB and PTP/IP (libgphoto2)"},
     {0},
 };
 
@@ -259,6 +260,13 @@ weft_err weft_camera_expose(weft_camera_device *camera, double deadline_s, weft_
     if (camera->backend)
         return camera->backend->expose(camera->state, deadline_s, idle_here, camera, frame, err);
     return weft_camera_remote_expose(&camera->remote, &camera->wait, deadline_s, frame, err);
+}
+
+void weft_captured_frame_fini(weft_captured_frame *frame)
+{
+    weft_mosaic_fini(&frame->mosaic);
+    weft_free(frame->file.bytes);
+    frame->file = (weft_camera_file){0};
 }
 
 void weft_camera_close(weft_camera_device *camera)

@@ -294,11 +294,21 @@ static void describe_dng(const capture_run *run, weft_frame_info *info)
     strftime(info->date_time, sizeof info->date_time, "%Y:%m:%d %H:%M:%S", &local);
 }
 
-/* Writes the DNG, then its row in set.json: a row's file is always whole. */
+/* The camera's own file where it has one, else a DNG. */
+static weft_err write_frame(const capture_run *run, const char *path, weft_error *err)
+{
+    const weft_captured_frame *const frame = &run->shooter.frame;
+    weft_frame_info info;
+    if (frame->file.size > 0)
+        return weft_file_write(path, frame->file.bytes, frame->file.size, err);
+    describe_dng(run, &info);
+    return weft_dng_write(path, &frame->mosaic, &info, err);
+}
+
+/* Writes the file, then its row in set.json: a row's file is always whole. */
 static weft_err keep_frame(capture_run *run, const weft_planned_frame *planned, json_t *capture,
                            weft_error *err)
 {
-    weft_frame_info info;
     weft_set_frame row = {.file = (char *)(uintptr_t)planned->file, /* copied, not changed */
                           .role = planned->role,
                           .light = planned->light,
@@ -307,9 +317,8 @@ static weft_err keep_frame(capture_run *run, const weft_planned_frame *planned, 
                           .capture = capture};
     char *const path = weft_path_join(run->o.folder, planned->file, err);
     weft_err status = path ? WEFT_OK : WEFT_ERR_NOMEM;
-    describe_dng(run, &info);
     if (status == WEFT_OK)
-        status = weft_dng_write(path, &run->shooter.frame.mosaic, &info, err);
+        status = write_frame(run, path, err);
     if (status == WEFT_OK)
         status = weft_sha256_file(path, row.sha256, err);
     weft_free(path);
@@ -419,6 +428,8 @@ static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
 {
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
     const weft_camera_state *const camera = weft_camera_get_state(run->shooter.camera);
+    if (camera->width == 0) /* a frame tells, in the dark */
+        WEFT_TRY(weft_camera_configure(run->shooter.camera, &(weft_camera_settings){0}, err));
     if (found == WEFT_SET_INTERRUPTED) {
         WEFT_TRY(weft_set_folder_check_camera(&run->set, weft_camera_backend_name(run->shooter.camera),
                                               camera, err));
@@ -427,7 +438,7 @@ static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
     WEFT_TRY(complete_options(run, info, err));
     if (run->o.exposure_s <= 0)
         WEFT_TRY(find_exposure(run, info->n_lights, err));
-    weft_capture_plan_make(&run->o, info->n_lights, &run->plan);
+    weft_capture_plan_make(&run->o, info->n_lights, camera->suffix[0] ? camera->suffix : ".dng", &run->plan);
     if (run->plan.n == 0)
         return weft_fail(err, WEFT_ERR_USAGE, "no frame is asked for");
     WEFT_TRY(check_exposures(run, err));

@@ -14,7 +14,7 @@ typedef struct weft_planned_frame {
     double exposure_s; /* as asked of the camera */
     bool middle;       /* of its bracket: bright enough to see whether the light is on */
     bool shortest;     /* of its bracket: if this one clips, the set has no better */
-    char file[48];     /* "light-03.dng", "light-03-b1.dng" in a bracket */
+    char file[48];     /* "light-03.dng", "light-03-b1.dng" in a bracket; ".nef" and the like from DSLRs */
     bool have;         /* there already */
 } weft_planned_frame;
 
@@ -23,7 +23,9 @@ typedef struct weft_capture_plan {
     weft_planned_frame frames[WEFT_CAPTURE_MAX_FRAMES];
 } weft_capture_plan;
 
-/** Makes the plan.  `options` must be complete: lights, exposure, bracket set. */
-void weft_capture_plan_make(const weft_capture_options *options, int n_lights, weft_capture_plan *plan);
+/** Makes the plan.  `options` must be complete: lights, exposure, bracket set.  `suffix` ends the names of
+ * the files: ".dng", ".nef". */
+void weft_capture_plan_make(const weft_capture_options *options, int n_lights, const char *suffix,
+                            weft_capture_plan *plan);
 
 #endif

@@ -73,7 +73,7 @@ void weft_shooter_end(weft_shooter *s)
 {
     weft_camera_set_idle(s->camera, NULL, NULL);
     go_dark(s, NULL, NULL);
-    weft_mosaic_fini(&s->frame.mosaic);
+    weft_captured_frame_fini(&s->frame);
 }
 
 weft_err weft_shooter_set_camera(weft_shooter *s, double exposure_s, double gain, weft_error *err)

@@ -62,6 +62,7 @@ typedef struct weft_device_names {
 
 /**
  * Turns the options into names: --port and --camera as they are, what is not given from DIR/rig.json.
+ * With --rig, a --camera that is the name of a backend alone ("gphoto") is the rig's camera of that backend.
  * Nothing is opened.
  *
  * @return WEFT_ERR_MISSING when no rig was started in DIR, WEFT_ERR_DEVICE when the one that was has

@@ -38,13 +38,14 @@ static const struct {
     [DSLR_FAULT_BUSY] = {"busy", 3600},
     [DSLR_FAULT_STUCK] = {"stuck", 3600},
     [DSLR_FAULT_NO_SHUTTER] = {"no-shutter", 1e6},
-    [DSLR_FAULT_CARD_FULL] = {"card-full", 1e6},
+    [DSLR_FAULT_CARD_FULL] = {"card-full", 1},
     [DSLR_FAULT_JPEG] = {"jpeg", 1e6},
     [DSLR_FAULT_TWICE] = {"twice", 1e6},
     [DSLR_FAULT_STALE] = {"stale", 1e6},
     [DSLR_FAULT_LINE] = {"line", 1e6},
     [DSLR_FAULT_UNPLUG] = {"unplug", 100},
     [DSLR_FAULT_SHORT] = {"short", 1e6},
+    [DSLR_FAULT_BURST] = {"burst", 1e6},
 };
 
 /* ------------------------------------------------------------------------------------------ helpers */
@@ -199,7 +200,7 @@ uint16_t dslr_release(weft_dslr *d, bool to_card)
         return PTP_DEVICE_BUSY;
     if (to_card)
         return PTP_STORE_NOT_AVAILABLE;
-    if (dslr_take_fault(d, DSLR_FAULT_CARD_FULL))
+    if (d->faults[DSLR_FAULT_CARD_FULL] > 0)
         return PTP_STORE_FULL;
     if (!dslr_exposure(&d->properties, &numerator, &denominator))
         return PTP_GENERAL_ERROR; /* bulb wants a second command to end it */
@@ -336,16 +337,33 @@ static json_t *refuse(const char *reason)
     return json_pack("{s:b, s:s}", "ok", 0, "error", reason);
 }
 
+static json_t *describe_settings(const weft_dslr *d)
+{
+    json_t *const settings = json_object();
+    for (int vendor = 0; vendor < 2; vendor++) {
+        uint16_t codes[DSLR_N_PROPERTIES];
+        const int n = dslr_property_codes(vendor, codes);
+        for (int i = 0; i < n; i++) {
+            char name[8];
+            snprintf(name, sizeof name, "0x%04x", codes[i]);
+            json_object_set_new(settings, name,
+                                json_integer((json_int_t)dslr_property_get(&d->properties, codes[i])));
+        }
+    }
+    return settings;
+}
+
 static json_t *describe(weft_dslr *d)
 {
     json_t *const faults = json_object();
     for (int i = 0; i < DSLR_N_FAULTS; i++)
         if (d->faults[i] > 0)
             json_object_set_new(faults, fault_names[i].name, json_real(d->faults[i]));
-    return json_pack("{s:b, s:b, s:b, s:b, s:i, s:i, s:i, s:o}", "ok", 1, "plugged",
+    return json_pack("{s:b, s:b, s:b, s:b, s:i, s:i, s:i, s:o, s:o}", "ok", 1, "plugged",
                      ptpip_server_is_plugged(d->server), "session", d->session, "busy", is_busy(d),
                      "releases", d->n_releases, "pictures", d->n_pictures, "battery",
-                     (int)dslr_property_get(&d->properties, PTP_PROP_BATTERY), "faults", faults);
+                     (int)dslr_property_get(&d->properties, PTP_PROP_BATTERY), "settings",
+                     describe_settings(d), "faults", faults);
 }
 
 static json_t *obey_fault(weft_dslr *d, const char *name, const char *number)
@@ -362,8 +380,8 @@ static json_t *obey_fault(weft_dslr *d, const char *name, const char *number)
             d->busy_until_s = weft_clock_s() + value;
         return describe(d);
     }
-    return refuse(
-        "dslr fault: wanted busy, stuck, no-shutter, card-full, jpeg, twice, stale, line, unplug or short");
+    return refuse("dslr fault: wanted busy, stuck, no-shutter, card-full, jpeg, twice, stale, line, unplug, "
+                  "short or burst");
 }
 
 static json_t *obey_setting(weft_dslr *d, const char *verb, const char *code_text, const char *value_text)

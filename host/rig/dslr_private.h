@@ -30,13 +30,14 @@ typedef enum dslr_fault {
     DSLR_FAULT_BUSY,       /* busy for so many seconds from now on */
     DSLR_FAULT_STUCK,      /* busy for so many seconds after the next exposure */
     DSLR_FAULT_NO_SHUTTER, /* so many times the shutter does not open: no picture, no word */
-    DSLR_FAULT_CARD_FULL,  /* so many releases are refused: no room */
+    DSLR_FAULT_CARD_FULL,  /* 1: releases are refused: no room */
     DSLR_FAULT_JPEG,       /* so many pictures are JPEGs whatever is set */
     DSLR_FAULT_TWICE,      /* so many pictures are announced twice */
     DSLR_FAULT_STALE,      /* so many times the picture before is announced again before the new one */
     DSLR_FAULT_LINE,       /* so many downloads break off in the middle; the cable is good */
     DSLR_FAULT_UNPLUG,     /* the cable is pulled when so many percent of the next picture are through */
     DSLR_FAULT_SHORT,      /* so many files end in the middle, and the camera does not notice */
+    DSLR_FAULT_BURST,      /* so many releases give two pictures */
     DSLR_N_FAULTS,
 } dslr_fault;
 

@@ -110,12 +110,13 @@ void *dslr_shutter_run(void *dslr)
         const bool opens = !dslr_take_fault(d, DSLR_FAULT_NO_SHUTTER);
         const bool jpeg = dslr_take_fault(d, DSLR_FAULT_JPEG);
         const unsigned compression = jpeg ? NIKON_JPEG_FINE : dslr_property_get(&set, PTP_PROP_COMPRESSION);
+        const int n = !opens ? 0 : dslr_take_fault(d, DSLR_FAULT_BURST) ? 2 : 1;
         pthread_mutex_unlock(&d->lock);
-        if (opens)
+        for (int i = 0; i < n; i++)
             photograph(d, &set, compression);
         pthread_mutex_lock(&d->lock);
         if (opens) {
-            d->n_pictures++;
+            d->n_pictures += n;
             dslr_add_event(d, NIKON_EVENT_CAPTURE_COMPLETE, 0);
         }
         if (d->faults[DSLR_FAULT_STUCK] > 0) {

@@ -473,7 +473,7 @@ static void test_sealed_memory(void **state)
     uint16_t samples[1000];
     for (int i = 0; i < 1000; i++)
         samples[i] = (uint16_t)i;
-    const int fd = weft_camera_sealed_memory(samples, sizeof samples);
+    const int fd = weft_camera_sealed_memory(samples, sizeof samples, NULL, 0);
     assert_true(weft_camera_is_sealed_memory(fd, sizeof samples));
     assert_false(weft_camera_is_sealed_memory(fd, sizeof samples - 2));
     assert_int_equal(pwrite(fd, samples, 2, 0), -1);

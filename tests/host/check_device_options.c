@@ -48,6 +48,30 @@ static const char *rig_folder(const char *name, const char *text)
     return folder;
 }
 
+static void test_a_rigs_camera_by_its_backend(void **state)
+{
+    (void)state;
+    char text[400];
+    snprintf(text, sizeof text,
+             "{\"weft\":\"rig\",\"version\":1,\"pty\":\"/dev/pts/7\",\"camera\":\"aravis:127.0.0.1\","
+             "\"cameras\":[\"aravis:127.0.0.1\",\"gphoto:ptpip:127.0.0.1:15740\"],\"pid\":%ld}",
+             (long)getpid());
+    weft_device_names names;
+    weft_device_options options = {.rig = rig_folder("two", text), .camera = "gphoto"};
+    assert_ok(weft_device_options_resolve(&options, &names, err));
+    assert_string_equal(names.camera, "gphoto:ptpip:127.0.0.1:15740");
+    assert_string_equal(names.port, "/dev/pts/7");
+    options.camera = "gphoto:usb:001,004";
+    assert_ok(weft_device_options_resolve(&options, &names, err));
+    assert_string_equal(names.camera, "gphoto:usb:001,004");
+    options.camera = "auto";
+    assert_ok(weft_device_options_resolve(&options, &names, err));
+    assert_string_equal(names.camera, "auto");
+    options.camera = "libcamera";
+    assert_fails(weft_device_options_resolve(&options, &names, err), WEFT_ERR_MISSING,
+                 "has no such camera, only aravis:127.0.0.1, gphoto:ptpip:127.0.0.1:15740");
+}
+
 static void test_names_come_from_the_options_first(void **state)
 {
     (void)state;
@@ -114,6 +138,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rows_fill_the_embedded_struct),
         cmocka_unit_test(test_names_come_from_the_options_first),
+        cmocka_unit_test(test_a_rigs_camera_by_its_backend),
         cmocka_unit_test(test_a_rig_that_is_not_there_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
