@@ -36,7 +36,7 @@ static void write_png(const char *name, int side, int channels, const uint16_t *
 static void check_constants(void **state)
 {
     (void)state;
-    weft_baked b;
+    weft_baked b = {0};
     assert_ok(bake(":a := ( opaquematerial :albedo_color = 0.2 :specular_roughness = 0.4 )\n"
                    ":b := ( opaquematerial :albedo_color = [1, 0, 0.5] :specular_roughness = 0.8 )\n"
                    ":m := ( opaquematerial :specular_intensity = 0.08 :albedo_tint_color = [1, 1, 0.5]\n"
@@ -58,7 +58,7 @@ static void check_mask_and_normals(void **state)
     static const uint16_t mask[4] = {0, 65535, 32768, 65535};
     /* 8 bit: x = 0.6, y = 0, z = 0.8 as nearly as the codes have it */
     static const uint16_t normals[12] = {204, 128, 230, 204, 128, 230, 204, 128, 230, 204, 128, 230};
-    weft_baked b;
+    weft_baked b = {0};
     write_png("mask.png", 2, 1, mask, 16);
     write_png("nml.png", 2, 3, normals, 8);
     assert_ok(
@@ -80,7 +80,7 @@ static void check_texture_conventions(void **state)
 {
     (void)state;
     static const uint16_t colour[3] = {128, 255, 0}, normal[3] = {128, 255, 128};
-    weft_baked b;
+    weft_baked b = {0};
     write_png("colour.png", 1, 3, colour, 8);
     write_png("down.png", 1, 3, normal, 8);
     assert_ok(bake(":m := ( opaquematerial :albedo_map = ( :name = \"colour.png\" )\n"
@@ -99,7 +99,7 @@ static void check_texture_conventions(void **state)
 static void check_lobes(void **state)
 {
     (void)state;
-    weft_baked b;
+    weft_baked b = {0};
     assert_ok(bake(":iso := ( opaquematerial :specular_roughness = 0.2 )\n"
                    ":silk := ( anisotropicmaterial :specular_roughness = 0.6 :anisotropy = 0.5\n"
                    "          :tangent_rotation_deg = 90 )\n"
@@ -132,14 +132,14 @@ static void check_generated_masks(void **state)
     static const char *const kinds[] = {"noise", "slope", "height", "cavity"};
     static uint16_t normals[16 * 16 * 3];
     for (int i = 0; i < 256; i++) {
-        normals[3 * i] = (uint16_t)(128 + 60 * sin(i * 0.39269908));
-        normals[3 * i + 1] = 128;
-        normals[3 * i + 2] = 240;
+        normals[3 * (size_t)i] = (uint16_t)(128 + 60 * sin(i * 0.39269908));
+        normals[3 * (size_t)i + 1] = 128;
+        normals[3 * (size_t)i + 2] = 240;
     }
     write_png("waves.png", 16, 3, normals, 8);
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
         char text[512];
-        weft_baked b;
+        weft_baked b = {0};
         (void)snprintf(text, sizeof text,
                        ":w := ( opaquematerial :normal_map = ( :name = \"waves\" ) :albedo_color = 0 )\n"
                        ":m := ( opaquematerial :layers = [ ( w ) ( opaquematerial :albedo_color = 1\n"
@@ -159,7 +159,7 @@ static void check_generated_masks(void **state)
 static void check_missing_files(void **state)
 {
     (void)state;
-    weft_baked b;
+    weft_baked b = {0};
     assert_fails(bake(":m := ( opaquematerial :normal_map = ( :name = \"gone\" ) )", 4, &b, err),
                  WEFT_ERR_MISSING, "c.radattr:1:48: there is no image");
     assert_fails(bake(":m := ( opaquematerial :scan = \"x.maps\" )", 4, &b, err), WEFT_ERR_UNSUPPORTED,

@@ -1,0 +1,493 @@
+#include "shading/bake/mips.h"
+
+#include "core/mem.h"
+#include "core/parallel.h"
+#include "shading/bake/gloss.h"
+#include "shading/bake/normal_filter.h"
+#include "shading/bake/vmf.h"
+
+#include <math.h>
+#include <string.h>
+
+const char weft_mip_rule_names[] = "closest|length|vmf|vmf-consistent|toksvig|none";
+
+/* A footprint beyond this is read in strides: a distribution of 4096 slopes is known well enough. */
+enum { MAX_SIDE = 64, MAX_TEXELS = MAX_SIDE * MAX_SIDE, MEDIAN_ROUNDS = 24 };
+
+weft_mip_options weft_mip_defaults(void)
+{
+    return (weft_mip_options){.rule = WEFT_MIP_CLOSEST};
+}
+
+/* -- one footprint ------------------------------------------------------------------------------------ */
+
+/* What a footprint is, summed: enough for every rule but the closest. */
+typedef struct footprint {
+    double weight, mean[3], shortened[3], alpha, alpha2;
+} footprint;
+
+static void gather(footprint *f, const double n[3], double alpha, double weight, weft_mip_rule rule)
+{
+    const double length = rule == WEFT_MIP_LENGTH ? 1 - weft_ggx_missing_length(alpha) : 0;
+    f->weight += weight;
+    f->alpha += weight * alpha;
+    f->alpha2 += weight * alpha * alpha;
+    for (int c = 0; c < 3; c++) {
+        f->mean[c] += weight * n[c];
+        f->shortened[c] += weight * length * n[c];
+    }
+}
+
+static double norm(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* alpha whose GGX has a mean normal of length 1 - missing, by the gloss table's exact inverse. */
+static double alpha_of_missing(double missing)
+{
+    if (missing >= 1.0 / 3)
+        return 1;
+    double low = 0, high = 1;
+    for (int k = 0; k < 48; k++) {
+        const double middle = 0.5 * (low + high);
+        *(weft_ggx_missing_length(middle) < missing ? &low : &high) = middle;
+    }
+    return high;
+}
+
+static double by_sums(weft_mip_rule rule, const footprint *f)
+{
+    const double r = fmin(norm(f->mean) / f->weight, 1), alpha2 = f->alpha2 / f->weight;
+    switch (rule) {
+    case WEFT_MIP_LENGTH:
+        return alpha_of_missing(1 - norm(f->shortened) / f->weight);
+    case WEFT_MIP_VMF:
+        return fmin(weft_vmf_roughness(sqrt(alpha2), weft_vmf_kappa(r), WEFT_VMF_LISTING), 1);
+    case WEFT_MIP_VMF_CONSISTENT:
+        return fmin(weft_vmf_roughness(sqrt(alpha2), weft_vmf_kappa(r), WEFT_VMF_CONSISTENT), 1);
+    case WEFT_MIP_TOKSVIG: {
+        const double power = fmax(2 / alpha2 - 2, 0); /* S-CNV-04 */
+        return sqrt(2 / (power * weft_toksvig_factor(r, power) + 2));
+    }
+    case WEFT_MIP_CLOSEST:
+    case WEFT_MIP_NONE:
+        break;
+    }
+    return f->alpha / f->weight;
+}
+
+/* Slope of a normal against the mean normal (unit), squared: tan^2 of the angle between them. */
+static inline float slope2(const float n[3], const double mean[3])
+{
+    const double c = (double)n[0] * mean[0] + (double)n[1] * mean[1] + (double)n[2] * mean[2];
+    const double s2 = fmax(1 - c * c, 0), c2 = fmax(c, 0.01);
+    return (float)(s2 / (c2 * c2));
+}
+
+/* Sum of w (2 P(t) - 1) over a footprint, P the share of GGX slopes within t of the mean normal. */
+static double balance(int n, const float *d2, const float *a2, const float *w, double square)
+{
+    const float t2 = (float)square;
+    float sum = 0;
+    for (int i = 0; i < n; i++) {
+        const float s = t2 + d2[i] + a2[i];
+        sum += w[i] * (t2 - d2[i] - a2[i]) / sqrtf(fmaxf(s * s - 4 * t2 * d2[i], 1e-20F));
+    }
+    return (double)sum;
+}
+
+/* The square of the median slope: the root of the balance by false position within a bracket (Illinois). */
+static double median2(int n, const float *d2, const float *a2, const float *w)
+{
+    double x0 = 1e9, x1 = 0;
+    for (int i = 0; i < n; i++) {
+        x0 = fmin(x0, (double)a2[i]);
+        x1 = fmax(x1, (double)(d2[i] + a2[i]));
+    }
+    if (x1 - x0 < 1e-5 * x1)
+        return x1;
+    double f0 = balance(n, d2, a2, w, x0), f1 = balance(n, d2, a2, w, x1);
+    if (f0 >= 0 || f1 <= 0) /* rounding */
+        return f0 >= 0 ? x0 : x1;
+    for (int round = 0; round < MEDIAN_ROUNDS && x1 - x0 > 1e-4 * x1; round++) {
+        const double x = x0 - f0 * (x1 - x0) / (f1 - f0), f = balance(n, d2, a2, w, x);
+        if (fabs(f) < 1e-4 * f1)
+            return x;
+        if (f < 0) {
+            x0 = x;
+            f0 = f;
+            f1 *= 0.5;
+        } else {
+            x1 = x;
+            f1 = f;
+            f0 *= 0.5;
+        }
+    }
+    return 0.5 * (x0 + x1);
+}
+
+/* Slopes at which the two distributions are held against each other, as factors of the median squared: where
+ * a GGX has 5, 15, 30, 50, 70, 85 and 95 per cent. */
+static const double probes[] = {0.0526, 0.1765, 0.4286, 1, 2.3333, 5.6667, 19};
+
+enum { PROBES = sizeof probes / sizeof probes[0], CLOSEST_ROUNDS = 18 };
+
+static double farthest(const double *squares, const double *shares, double alpha2)
+{
+    double most = 0;
+    for (int k = 0; k < PROBES; k++)
+        most = fmax(most, fabs(shares[k] - squares[k] / (squares[k] + alpha2)));
+    return most;
+}
+
+/* alpha of the GGX that is nowhere far from the footprint: golden section about the median. */
+static double closest(int n, const float *d2, const float *a2, const float *w)
+{
+    double squares[PROBES], shares[PROBES], weight = 0;
+    const double middle = median2(n, d2, a2, w);
+    for (int i = 0; i < n; i++)
+        weight += (double)w[i];
+    for (int k = 0; k < PROBES; k++) {
+        squares[k] = probes[k] * middle;
+        shares[k] = 0.5 + 0.5 * balance(n, d2, a2, w, squares[k]) / weight;
+    }
+    const double golden = 0.6180339887498949;
+    double low = log(middle) - 1, high = log(middle) + 1;
+    double a = high - golden * (high - low), b = low + golden * (high - low);
+    double fa = farthest(squares, shares, exp(a)), fb = farthest(squares, shares, exp(b));
+    for (int round = 0; round < CLOSEST_ROUNDS; round++)
+        if (fa < fb) {
+            high = b;
+            b = a;
+            fb = fa;
+            a = high - golden * (high - low);
+            fa = farthest(squares, shares, exp(a));
+        } else {
+            low = a;
+            a = b;
+            fa = fb;
+            b = low + golden * (high - low);
+            fb = farthest(squares, shares, exp(b));
+        }
+    return exp(0.25 * (low + high));
+}
+
+double weft_mip_roughness(weft_mip_rule rule, int n, const float (*normals)[3], const float *weights,
+                          const float *alphas)
+{
+    footprint f = {0};
+    for (int i = 0; i < n; i++) {
+        const double v[3] = {(double)normals[i][0], (double)normals[i][1], (double)normals[i][2]};
+        gather(&f, v, (double)alphas[i], (double)weights[i], rule);
+    }
+    if (rule != WEFT_MIP_CLOSEST)
+        return by_sums(rule, &f);
+    float d2[MAX_TEXELS], a2[MAX_TEXELS], w[MAX_TEXELS];
+    const double length = norm(f.mean);
+    double mean[3] = {0, 0, 1};
+    for (int c = 0; c < 3 && length > 0; c++)
+        mean[c] = f.mean[c] / length;
+    const int kept = n < MAX_TEXELS ? n : MAX_TEXELS;
+    for (int i = 0; i < kept; i++) {
+        const int from = (int)((long)i * n / kept);
+        d2[i] = slope2(normals[from], mean);
+        a2[i] = alphas[from] * alphas[from];
+        w[i] = weights[from];
+    }
+    return fmin(closest(kept, d2, a2, w), 1);
+}
+
+/* -- levels of normals and roughness ------------------------------------------------------------------ */
+
+typedef struct level_job {
+    weft_baked *baked;
+    weft_mip_rule rule;
+    int level;
+    float *scratch; /* per band: [3][MAX_TEXELS] */
+} level_job;
+
+/* The texels of level 0 that a texel of a level covers, [begin, end), with the shares of the first and last.
+ */
+typedef struct extent {
+    int begin, end;
+    double first, last;
+} extent;
+
+static extent extent_of(int i, int n, int n0)
+{
+    const double from = (double)i * n0 / n, to = (double)(i + 1) * n0 / n;
+    extent e = {(int)floor(from), (int)ceil(to - 1e-9), 1, 1};
+    e.first = fmin(e.begin + 1, to) - from;
+    e.last = e.end - e.begin > 1 ? to - (e.end - 1) : e.first;
+    return e;
+}
+
+static inline double share(const extent *e, int i)
+{
+    return i == e->begin ? e->first : i == e->end - 1 ? e->last : 1;
+}
+
+static double alpha_at(const weft_baked *b, int x, int y)
+{
+    const weft_baked_map *const map = &b->maps[WEFT_BAKED_ROUGHNESS];
+    return (double)(map->n_mips > 0 ? weft_image_row(&map->mips[0], 0, y)[x] : map->constant[0]);
+}
+
+static double anisotropy_at(const weft_baked *b, int x, int y)
+{
+    const weft_baked_map *const map = &b->maps[WEFT_BAKED_ANISOTROPY];
+    return (double)(map->n_mips > 0 ? weft_image_row(&map->mips[0], 0, y)[x] : map->constant[0]);
+}
+
+static double closest_of(const level_job *job, const extent *ex, const extent *ey, const double mean[3],
+                         float *scratch)
+{
+    const weft_image *const normal = &job->baked->maps[WEFT_BAKED_NORMAL].mips[0];
+    const int step_x = (ex->end - ex->begin + MAX_SIDE - 1) / MAX_SIDE;
+    const int step_y = (ey->end - ey->begin + MAX_SIDE - 1) / MAX_SIDE;
+    float *const d2 = scratch, *const a2 = scratch + (size_t)MAX_TEXELS, *const w = a2 + (size_t)MAX_TEXELS;
+    int n = 0;
+    for (int y = ey->begin; y < ey->end; y += step_y)
+        for (int x = ex->begin; x < ex->end; x += step_x, n++) {
+            const float v[3] = {weft_image_row(normal, 0, y)[x], weft_image_row(normal, 1, y)[x],
+                                weft_image_row(normal, 2, y)[x]};
+            const double alpha = alpha_at(job->baked, x, y);
+            d2[n] = slope2(v, mean);
+            a2[n] = (float)(alpha * alpha * (1 - anisotropy_at(job->baked, x, y)));
+            w[n] = (float)(share(ex, x) * share(ey, y));
+        }
+    return closest(n, d2, a2, w);
+}
+
+static void sum_footprint(const level_job *job, const extent *ex, const extent *ey, footprint *f)
+{
+    const weft_image *const normal = &job->baked->maps[WEFT_BAKED_NORMAL].mips[0];
+    for (int y = ey->begin; y < ey->end; y++)
+        for (int x = ex->begin; x < ex->end; x++) {
+            const double n[3] = {(double)weft_image_row(normal, 0, y)[x],
+                                 (double)weft_image_row(normal, 1, y)[x],
+                                 (double)weft_image_row(normal, 2, y)[x]};
+            const double alpha = alpha_at(job->baked, x, y);
+            /* with anisotropy, the widths of both axes in one number; put apart again below */
+            gather(f, n, alpha * sqrt(1 - anisotropy_at(job->baked, x, y)), share(ex, x) * share(ey, y),
+                   job->rule);
+        }
+}
+
+/* What the normals add is added to both axes: alpha_t^2 + more, alpha_b^2 + more. */
+static void store_lobe(const level_job *job, int x, int y, double alpha, const footprint *f)
+{
+    weft_baked_map *const maps = job->baked->maps;
+    weft_baked_map *const s = &maps[WEFT_BAKED_ANISOTROPY];
+    float *const out = weft_image_row(&maps[WEFT_BAKED_ROUGHNESS].mips[job->level], 0, y);
+    if (s->n_mips == 0 && !(s->constant[0] > 0)) {
+        out[x] = (float)fmin(alpha, 1);
+        return;
+    }
+    const double ratio =
+        1 - (double)(s->n_mips > 0 ? weft_image_row(&s->mips[job->level], 0, y)[x] : s->constant[0]);
+    const double base2 = f->alpha2 / f->weight, more = fmax(alpha * alpha - base2, 0);
+    const double along2 = base2 / fmax(ratio, 1e-3) + more, across2 = base2 * ratio + more;
+    out[x] = (float)fmin(sqrt(along2), 1);
+    if (s->n_mips > 0)
+        weft_image_row(&s->mips[job->level], 0, y)[x] = (float)fmax(1 - sqrt(across2 / along2), 0);
+}
+
+static void normal_rows(void *context, int band, int begin, int end)
+{
+    const level_job *const job = context;
+    weft_baked_map *const maps = job->baked->maps;
+    weft_image *const normal = &maps[WEFT_BAKED_NORMAL].mips[job->level];
+    float *const scratch = job->scratch + (size_t)band * 3 * MAX_TEXELS;
+    for (int y = begin; y < end; y++) {
+        const extent ey = extent_of(y, normal->height, job->baked->height);
+        for (int x = 0; x < normal->width; x++) {
+            const extent ex = extent_of(x, normal->width, job->baked->width);
+            footprint f = {0};
+            sum_footprint(job, &ex, &ey, &f);
+            const double length = norm(f.mean);
+            double mean[3] = {0, 0, 1};
+            for (int c = 0; c < 3; c++) {
+                mean[c] = length > 0 ? f.mean[c] / length : mean[c];
+                weft_image_row(normal, c, y)[x] = (float)mean[c];
+            }
+            weft_image_row(&maps[WEFT_BAKED_NORMAL_LENGTH].mips[job->level], 0, y)[x] =
+                (float)fmin(length / f.weight, 1);
+            const double alpha = job->rule == WEFT_MIP_CLOSEST ? closest_of(job, &ex, &ey, mean, scratch)
+                                                               : by_sums(job->rule, &f);
+            store_lobe(job, x, y, alpha, &f);
+        }
+    }
+}
+
+/* -- levels of everything else ------------------------------------------------------------------------ */
+
+typedef struct mean_job {
+    const weft_image *from;
+    weft_image *to;
+} mean_job;
+
+static void mean_rows(void *context, int band, int begin, int end)
+{
+    const mean_job *const job = context;
+    (void)band;
+    for (int p = 0; p < job->to->planes; p++)
+        for (int y = begin; y < end; y++) {
+            const extent ey = extent_of(y, job->to->height, job->from->height);
+            for (int x = 0; x < job->to->width; x++) {
+                const extent ex = extent_of(x, job->to->width, job->from->width);
+                double sum = 0, weight = 0;
+                for (int v = ey.begin; v < ey.end; v++)
+                    for (int u = ex.begin; u < ex.end; u++) {
+                        const double w = share(&ex, u) * share(&ey, v);
+                        sum += w * (double)weft_image_row(job->from, p, v)[u];
+                        weight += w;
+                    }
+                weft_image_row(job->to, p, y)[x] = (float)(sum / weight);
+            }
+        }
+}
+
+static void make_unit(weft_image *image, int planes)
+{
+    const size_t n = weft_image_plane_size(image);
+    for (size_t i = 0; i < n; i++) {
+        double squares = 0;
+        for (int p = 0; p < planes; p++)
+            squares += (double)image->data[(size_t)p * n + i] * (double)image->data[(size_t)p * n + i];
+        for (int p = 0; p < planes; p++)
+            image->data[(size_t)p * n + i] =
+                squares > 0 ? (float)((double)image->data[(size_t)p * n + i] / sqrt(squares))
+                            : p == planes - 1;
+    }
+}
+
+static double covered(const weft_image *image, double scale, double at)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < weft_image_plane_size(image); i++)
+        count += (double)image->data[i] * scale > at;
+    return (double)count / (double)weft_image_plane_size(image);
+}
+
+/* The factor with which as many texels pass the test as in level 0 (Castano 2010). */
+static void keep_coverage(const weft_image *level0, weft_image *level, double at)
+{
+    const double wanted = covered(level0, 1, at);
+    double low = 0, high = 8;
+    for (int k = 0; k < 24; k++) {
+        const double middle = 0.5 * (low + high);
+        *(covered(level, middle, at) < wanted ? &low : &high) = middle;
+    }
+    const double above = covered(level, high, at) - wanted, below = wanted - covered(level, low, at);
+    const double scale = above <= below ? high : low;
+    for (size_t i = 0; i < weft_image_plane_size(level); i++)
+        level->data[i] = fminf((float)((double)level->data[i] * scale), 1);
+}
+
+static weft_err begin_level(weft_baked *baked, weft_baked_kind kind, int level, weft_error *err)
+{
+    weft_baked_map *const map = &baked->maps[kind];
+    const int w = baked->width >> level, h = baked->height >> level;
+    weft_image_fini(&map->mips[level]);
+    return weft_image_init(&map->mips[level], w > 0 ? w : 1, h > 0 ? h : 1, weft_baked_rows[kind].planes,
+                           err);
+}
+
+/* From the level above when that is exactly half: the same mean for a quarter of the work. */
+static weft_err average_level(weft_baked *baked, weft_baked_kind kind, int level,
+                              const weft_mip_options *options, weft_error *err)
+{
+    weft_baked_map *const map = &baked->maps[kind];
+    WEFT_TRY(begin_level(baked, kind, level, err));
+    const bool halves = baked->width % (1 << level) == 0 && baked->height % (1 << level) == 0;
+    const bool is_plain = kind != WEFT_BAKED_OPACITY && kind != WEFT_BAKED_TANGENT &&
+                          kind != WEFT_BAKED_ANISOTROPY && kind != WEFT_BAKED_BENT_CONE &&
+                          kind != WEFT_BAKED_DETAIL_NORMAL;
+    mean_job job = {&map->mips[halves && is_plain ? level - 1 : 0], &map->mips[level]};
+    weft_parallel_rows(map->mips[level].height, mean_rows, &job);
+    if (kind == WEFT_BAKED_TANGENT)
+        make_unit(&map->mips[level], 2);
+    if (kind == WEFT_BAKED_BENT_CONE || kind == WEFT_BAKED_DETAIL_NORMAL)
+        make_unit(&map->mips[level], 3);
+    if (kind == WEFT_BAKED_OPACITY && options->coverage_at > 0)
+        keep_coverage(&map->mips[0], &map->mips[level], options->coverage_at);
+    return WEFT_OK;
+}
+
+static weft_err spread_roughness(weft_baked *baked, weft_error *err)
+{
+    weft_baked_map *const map = &baked->maps[WEFT_BAKED_ROUGHNESS];
+    if (map->n_mips > 0)
+        return WEFT_OK;
+    WEFT_TRY(weft_baked_add(baked, WEFT_BAKED_ROUGHNESS, baked->width, baked->height, err));
+    for (size_t i = 0; i < weft_image_plane_size(&map->mips[0]); i++)
+        map->mips[0].data[i] = map->constant[0];
+    return WEFT_OK;
+}
+
+static weft_err filter_level(weft_baked *baked, int level, const weft_mip_options *options, float *scratch,
+                             weft_error *err)
+{
+    WEFT_TRY(begin_level(baked, WEFT_BAKED_NORMAL, level, err));
+    WEFT_TRY(begin_level(baked, WEFT_BAKED_NORMAL_LENGTH, level, err));
+    WEFT_TRY(begin_level(baked, WEFT_BAKED_ROUGHNESS, level, err));
+    level_job job = {baked, options->rule, level, scratch};
+    const int rows = baked->maps[WEFT_BAKED_NORMAL].mips[level].height;
+    return weft_parallel_rows_progress(rows, normal_rows, &job, "mips", err);
+}
+
+static bool is_filtered(weft_baked_kind kind)
+{
+    return kind == WEFT_BAKED_NORMAL || kind == WEFT_BAKED_NORMAL_LENGTH || kind == WEFT_BAKED_ROUGHNESS;
+}
+
+static void note_means(weft_baked *baked)
+{
+    for (int k = 0; k < WEFT_BAKED_COUNT; k++) {
+        weft_baked_map *const map = &baked->maps[k];
+        const size_t n = map->n_mips > 0 ? weft_image_plane_size(&map->mips[0]) : 0;
+        for (int p = 0; n > 0 && p < weft_baked_rows[k].planes; p++) {
+            double sum = 0;
+            for (size_t i = 0; i < n; i++)
+                sum += (double)weft_image_plane(&map->mips[0], p)[i];
+            map->constant[p] = (float)(sum / (double)n);
+        }
+    }
+}
+
+weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft_error *err)
+{
+    const bool bumpy = baked->maps[WEFT_BAKED_NORMAL].n_mips > 0;
+    if (baked->width == 0)
+        return WEFT_OK;
+    int levels = weft_baked_levels(baked->width, baked->height);
+    if (options->max_levels > 0 && options->max_levels < levels)
+        levels = options->max_levels;
+    float *const scratch =
+        weft_alloc((size_t)weft_parallel_n_bands(baked->height) * 3 * MAX_TEXELS, sizeof *scratch, err);
+    if (!scratch)
+        return WEFT_ERR_NOMEM;
+    weft_err status = WEFT_OK;
+    if (bumpy && (status = spread_roughness(baked, err)) == WEFT_OK &&
+        (status = weft_baked_add(baked, WEFT_BAKED_NORMAL_LENGTH, baked->width, baked->height, err)) ==
+            WEFT_OK)
+        for (size_t i = 0; i < weft_image_plane_size(&baked->maps[WEFT_BAKED_NORMAL_LENGTH].mips[0]); i++)
+            baked->maps[WEFT_BAKED_NORMAL_LENGTH].mips[0].data[i] = 1;
+    for (int level = 1; level < levels && status == WEFT_OK; level++) {
+        for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK;
+             k++) /* anisotropy before the lobe needs it */
+            if (baked->maps[k].n_mips > 0 && !(bumpy && is_filtered((weft_baked_kind)k)))
+                status = average_level(baked, (weft_baked_kind)k, level, options, err);
+        if (status == WEFT_OK && bumpy)
+            status = filter_level(baked, level, options, scratch, err);
+    }
+    for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK; k++)
+        if (baked->maps[k].n_mips > 0)
+            baked->maps[k].n_mips = levels;
+    if (status == WEFT_OK)
+        note_means(baked);
+    weft_free(scratch);
+    return status;
+}
