@@ -154,6 +154,53 @@ static void test_panic_at_any_byte_of_a_frame(void **state)
     assert_true(say_distribution("panic inside a frame, from its first byte", ms, 200) < 1);
 }
 
+/* -- power that goes while a setting is stored -------------------------------------------------------------
+ */
+
+static uint8_t number_request(uint8_t *wire, const char *number)
+{
+    weft_cfg_set_request r = {.key = WEFT_KEY_SERIAL_NUMBER};
+    uint8_t bytes[WEFT_CFG_SET_REQUEST_BYTES];
+    memcpy(r.value, number, 8);
+    weft_cfg_set_request_encode(&r, bytes);
+    return request(wire, 77, WEFT_CMD_CFG_SET, bytes, sizeof bytes);
+}
+
+/* The bytes of a slot go to the EEPROM one by one, 3.4 ms each; the one that is stored when the power goes is
+ * spoilt.  Every 75 us of it: the old number or the new one, never a third thing. */
+static void test_power_goes_at_any_moment_of_a_setting(void **state)
+{
+    (void)state;
+    char now[9] = "WL-00000", next[9];
+    uint8_t wire[WEFT_FRAME_WIRE_MAX];
+    int n_old = 0, n_new = 0;
+    weft_controller_sim_send(sim, wire, number_request(wire, now));
+    weft_controller_sim_run(sim, 400e3);
+    for (int i = 0; i < 400; i++) {
+        weft_hello_reply h;
+        uint8_t rest[256];
+        snprintf(next, sizeof next, "WL-%05d", i + 1);
+        weft_controller_sim_send(sim, wire, number_request(wire, next));
+        weft_controller_sim_run(sim, 75.0 * i);
+        weft_controller_sim_power_cycle(sim);
+        weft_controller_sim_run(sim, 20e3);
+        while (weft_controller_sim_receive(sim, rest, sizeof rest))
+            ;
+        assert_int_equal(hello(&h), WEFT_STATUS_OK);
+        assert_int_equal(h.settings_state, WEFT_SETTINGS_LOADED);
+        const bool is_new = memcmp(h.serial_number, next, 8) == 0;
+        assert_true(is_new || memcmp(h.serial_number, now, 8) == 0);
+        n_new += is_new;
+        n_old += !is_new;
+        if (is_new)
+            memcpy(now, next, sizeof now);
+    }
+    print_message(
+        "power lost at 400 moments of storing a setting: %d times the old one, %d the new one, 0 neither\n",
+        n_old, n_new);
+    assert_true(n_old > 100 && n_new > 100);
+}
+
 /* -- a damaged line -------------------------------------------------------------------------------------- */
 
 typedef struct pulses {
@@ -404,9 +451,9 @@ int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, start, power_off)
     const struct CMUnitTest tests[] = {
-        TEST(test_a_killed_host_leaves_darkness), TEST(test_a_hang_at_any_moment_ends_dark),
-        TEST(test_panic_at_any_byte_of_a_frame),  TEST(test_10000_commands_over_a_damaged_line),
-        TEST(test_noise_lights_nothing),
+        TEST(test_a_killed_host_leaves_darkness),         TEST(test_a_hang_at_any_moment_ends_dark),
+        TEST(test_panic_at_any_byte_of_a_frame),          TEST(test_10000_commands_over_a_damaged_line),
+        TEST(test_power_goes_at_any_moment_of_a_setting), TEST(test_noise_lights_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
