@@ -337,7 +337,7 @@ static void open_again(void)
 {
     weft_controller *second = NULL;
     assert_fails(weft_controller_open(pty, LEASE_MS, &second, err), WEFT_ERR_DEVICE,
-                 "another program is using this port; close it first");
+                 "another program is using this port");
 }
 
 static void serial_second_opener(void **state)
