@@ -63,6 +63,10 @@ line FAILED 'serial line' 'a shorter or better USB cable'
 tell board line both
 sleep 30 7<>"$(jq -r .pty r/rig.json)" 9>&- &
 other=$!
+for _ in $(seq 100); do
+    [ "$(cat /proc/$other/comm 2>/dev/null)" = sleep ] && break # and has the port open
+    sleep 0.05
+done
 expect 1 '"verdict":"failed"' "$weft" doctor --rig r --json
 [ "$(jq -r '.checks[] | select(.verdict == "failed") | .name' <(head -n 1 out))" = 'other programs' ] || { cat out; exit 1; }
 grep -q "sleep (process $other)" out || { cat out; exit 1; }
