@@ -6,6 +6,7 @@
 
 #include "core/file.h"
 #include "core/mem.h"
+#include "host/light/usb_boards.h"
 
 #include <fnmatch.h>
 #include <stdio.h>
@@ -208,6 +209,34 @@ static void test_arduino_uno(void **state)
     assert_string_equal(get(&usb, "SYMLINK"), "");
 }
 
+/* The boards that weft flash knows are those of the rules, one for one. */
+static void test_rules_and_program_know_the_same_boards(void **state)
+{
+    (void)state;
+    int known = 0, nominated = 0;
+    for (const weft_usb_id *id = weft_usb_ids; id->vendor; id++, known++) {
+        char vendor[8], product[8];
+        snprintf(vendor, sizeof vendor, "%04x", id->vendor);
+        snprintf(product, sizeof product, "%04x", id->product);
+        const pairs tty = DEVICE("ACTION", "add", "SUBSYSTEM", "tty", "ATTRS{idVendor}", vendor,
+                                 "ATTRS{idProduct}", product, "ENV{ID_PATH_TAG}", "pci-1");
+        assert_string_equal(get(&tty, "ENV{ID_WEFT}"), "light");
+        const pairs usb = DEVICE("ACTION", "add", "SUBSYSTEM", "usb", "ENV{DEVTYPE}", "usb_device",
+                                 "ATTR{idVendor}", vendor, "ATTR{idProduct}", product);
+        assert_string_equal(get(&usb, "ENV{ID_MM_DEVICE_IGNORE}"), "1");
+    }
+    for (int i = 0; i < n_rules; i++)
+        for (int k = 0; k < rules[i].n; k++) {
+            const term *const t = &rules[i].terms[k];
+            if (strcmp(t->key, "ATTRS{idProduct}") != 0)
+                continue;
+            nominated++;
+            for (const char *bar = strchr(t->value, '|'); bar; bar = strchr(bar + 1, '|'))
+                nominated++;
+        }
+    assert_int_equal(nominated, known);
+}
+
 static void test_copy_without_serial_number(void **state)
 {
     (void)state;
@@ -268,6 +297,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_arduino_uno),
+        cmocka_unit_test(test_rules_and_program_know_the_same_boards),
         cmocka_unit_test(test_copy_without_serial_number),
         cmocka_unit_test(test_cameras),
         cmocka_unit_test(test_nothing_else_is_touched),
