@@ -12,13 +12,13 @@
 
 typedef struct solve_args {
     const char *calibration, *output, *method;
-    int geometry, resolution, gloss;
+    int geometry, resolution, gloss, bounce;
     double mm_per_px, thickness_mm, shadow;
 } solve_args;
 
 enum { GEOMETRY_AUTO, GEOMETRY_PLANE, GEOMETRY_SENSOR };
 enum { RESOLUTION_FULL, RESOLUTION_HALF };
-enum { GLOSS_AUTO, GLOSS_OFF };
+enum { MODEL_AUTO, MODEL_OFF };
 
 static const weft_field fields[] = {
     {.key = "calibration",
@@ -59,6 +59,12 @@ static const weft_field fields[] = {
      .choices = "auto|off",
      .def = "auto",
      .help = "auto: the robust method looks for the cloth's mirror light; off: every cloth is matte"},
+    {.key = "bounce",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(solve_args, bounce),
+     .choices = "auto|off",
+     .def = "auto",
+     .help = "auto: the robust method takes off the light from yarn to yarn; off: it stays"},
     {.key = "mm-per-px",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, mm_per_px),
@@ -224,7 +230,8 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
     weft_solve_options options = {.sensor_geometry = args->geometry == GEOMETRY_SENSOR,
                                   .plane_geometry = args->geometry == GEOMETRY_PLANE,
                                   .half = args->resolution == RESOLUTION_HALF,
-                                  .matte = args->gloss == GLOSS_OFF,
+                                  .matte = args->gloss == MODEL_OFF,
+                                  .no_bounce = args->bounce == MODEL_OFF,
                                   .mm_per_px = args->mm_per_px,
                                   .height_mm = args->thickness_mm,
                                   .shadow = args->shadow};

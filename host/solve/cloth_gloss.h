@@ -1,8 +1,8 @@
-/** Finds the mirror light of the cloth in a set (gloss.h), from blocks all over the picture. */
+/** Finds the mirror light of the cloth in a set (cloth_lobe.h), from blocks all over the picture. */
 #ifndef WEFT_HOST_SOLVE_CLOTH_GLOSS_H
 #define WEFT_HOST_SOLVE_CLOTH_GLOSS_H
 
-#include "host/solve/gloss.h"
+#include "host/solve/cloth_lobe.h"
 #include "host/solve/light_plates.h"
 
 /**

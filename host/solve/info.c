@@ -52,10 +52,10 @@ static weft_err inputs(const weft_set *set, const char *cal_folder, json_t *to, 
 static json_t *options_json(const weft_solve_options *o, const weft_maps *maps)
 {
     const weft_solve_method *const method = o->method ? o->method : weft_solve_methods[0];
-    return json_pack("{s:s, s:s, s:s, s:f, s:f, s:s}", "method", method->name, "geometry",
+    return json_pack("{s:s, s:s, s:s, s:f, s:f, s:s, s:s}", "method", method->name, "geometry",
                      maps->geometry == WEFT_GEOMETRY_PLANE ? "plane" : "sensor", "resolution",
                      o->half ? "half" : "full", "thickness_mm", o->height_mm, "shadow", o->shadow, "gloss",
-                     o->matte ? "off" : "auto");
+                     o->matte ? "off" : "auto", "bounce", o->no_bounce ? "off" : "auto");
 }
 
 static json_t *gloss_json(const weft_gloss *g)
@@ -84,6 +84,10 @@ static json_t *result_json(const weft_maps *maps, const weft_solve_run *run)
                   confidence / count, "uncertainty_deg_mean", uncertainty / count);
     if (result && run->report.found)
         json_object_set_new(result, "gloss", gloss_json(&run->gloss));
+    if (result && run->bounce.done)
+        json_object_set_new(result, "bounce",
+                            json_pack("{s:f, s:f}", "relief_mm", run->bounce.relief_mm, "openness_mean",
+                                      run->bounce.openness));
     return result;
 }
 
@@ -99,8 +103,9 @@ weft_err weft_solve_describe(const weft_set *set, const char *cal_folder, const 
     json_object_set_new(info, "options", options_json(options, maps));
     json_object_set_new(info, "result", result_json(maps, run));
     if (json_object_set_new(info, "seconds",
-                            json_pack("{s:f, s:f, s:f}", "read", run->seconds.read, "solve",
-                                      run->seconds.solve, "rectify", run->seconds.rectify)) != 0 &&
+                            json_pack("{s:f, s:f, s:f, s:f}", "read", run->seconds.read, "solve",
+                                      run->seconds.solve, "bounce", run->seconds.bounce, "rectify",
+                                      run->seconds.rectify)) != 0 &&
         status == WEFT_OK)
         status = weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the description of the maps");
     if (status != WEFT_OK)

@@ -6,7 +6,7 @@
  * (Torr and Zisserman, "MLESAC", CVIU 78, 2000, call it MSAC; every triple is tried, so nothing is random.)
  * It needs no number of lights to keep: on a steep flank three or four of ten are lit, on a matte crown all.
  */
-#include "host/solve/gloss.h"
+#include "host/solve/cloth_lobe.h"
 #include "host/solve/normal_equations.h"
 
 /* Squares beyond three sigma count no more. */
@@ -63,7 +63,7 @@ static WEFT_CLONES void judge_glossy(const weft_solve_samples *restrict matte,
     judge(matte, kept, &t, &scaled, &m, nothing, mark, answers);
 }
 
-/* With a known lobe: the mirror light is taken off first (gloss.h). */
+/* With a known lobe: the mirror light is taken off first (cloth_lobe.h). */
 static void solve_glossy(const weft_solve_samples *samples, weft_solve_answers *answers)
 {
     _Alignas(64) weft_lane_weights kept[WEFT_LIGHTS_MAX];
@@ -240,4 +240,5 @@ const weft_solve_method weft_method_robust = {
     .summary = "shadows left out; where gloss or a cast shadow remains, the lights that agree",
     .solve = solve_robust,
     .search = search_robust,
-    .takes_gloss = true};
+    .takes_gloss = true,
+    .takes_bounce = true};

@@ -6,7 +6,7 @@
 #include <assert.h>
 #include <math.h>
 
-enum { LOBES = 3, STEPS = 256, COARSEST = 16, TAPS_MAX = 2 * LOBES * COARSEST + 2, PLANES = 6 };
+enum { LOBES = 3, STEPS = 256, COARSEST = 16, TAPS_MAX = COARSEST + 2 * LOBES + 4, PLANES = 6 };
 
 static const double pi = 3.14159265358979323846;
 
@@ -108,17 +108,40 @@ typedef struct taps {
     float weight[TAPS_MAX];
 } taps;
 
+/* Adds `sign` times the integral of the samples from far left up to `x`, as weights of the samples.  A pixel
+ * is the mean over its area, so the integral is known exactly at the borders between pixels; between borders
+ * it is interpolated by the kernel. */
+static void add_integral(const kernel *k, double x, float sign, taps *t)
+{
+    const int border = (int)floor(x + 0.5); /* pixel whose area x lies in */
+    float near[2 * LOBES + 1], sum = 0;
+    const int first = border - LOBES; /* lower border of pixel i is at i - 0.5 */
+    for (int i = 0; i <= 2 * LOBES; i++) {
+        near[i] = kernel_at(k, x - (first + i - 0.5));
+        sum += near[i];
+    }
+    float passed = 0;                     /* of the weight of all borders: those above pixel i */
+    for (int i = 2 * LOBES; i > 1; i--) { /* the kernel is 0 at i = 0, so from i = 1 on all is passed */
+        passed += near[i] / sum;
+        t->weight[first + i - 1 - t->first] += sign * passed;
+    }
+    for (int i = t->first; i <= first; i++)
+        t->weight[i - t->first] += sign;
+}
+
+/* The mean over [at - widen / 2, at + widen / 2]. */
 static taps make_taps(const rectify_job *job, double at)
 {
-    taps t;
+    taps t = {0};
     float sum = 0;
-    const double reach = LOBES * job->widen;
-    t.first = (int)ceil(at - reach);
-    t.n = (int)floor(at + reach) - t.first + 1;
-    for (int i = 0; i < t.n; i++) {
-        t.weight[i] = kernel_at(&job->kernel, (t.first + i - at) / job->widen);
+    const double a = at - 0.5 * job->widen, b = at + 0.5 * job->widen;
+    t.first = (int)floor(a + 0.5) - LOBES + 1;
+    t.n = (int)floor(b + 0.5) + LOBES - t.first;
+    assert(t.n <= TAPS_MAX);
+    add_integral(&job->kernel, b, 1, &t);
+    add_integral(&job->kernel, a, -1, &t);
+    for (int i = 0; i < t.n; i++)
         sum += t.weight[i];
-    }
     for (int i = 0; i < t.n; i++)
         t.weight[i] /= sum;
     return t;

@@ -26,9 +26,11 @@ weft_err weft_plane_grid_init(weft_plane_grid *grid, const weft_camera *camera, 
 /**
  * Resamples maps in sensor geometry to the grid.
  *
- * Unit normals and albedo are filtered with a Lanczos kernel of three lobes (widened where the grid is
- * coarser than the sensor) and the normals made unit again; residual and confidence linearly.  A pixel
- * whose kernel touches one without an answer falls back to the answers among the nearest four; where
+ * A pixel is the mean over its area, on the sensor and on the grid.  So what is interpolated (by a Lanczos
+ * kernel of three lobes) is the integral of unit normals and albedo, known exactly at the borders between
+ * sensor pixels; a grid pixel is its difference, however coarse the grid.  The normals are made unit again;
+ * residual, confidence and uncertainty are interpolated linearly, bits and numbers taken from the nearest.  A
+ * pixel whose kernel touches one without an answer falls back to the answers among the nearest four; where
  * the nearest has none, or the camera does not look, there is no answer.
  *
  * @param sensor  maps with all four images and a mask, as solved

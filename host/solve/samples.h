@@ -26,7 +26,7 @@ typedef struct weft_lane_weights {
     float at[WEFT_SOLVE_LANES];
 } weft_lane_weights;
 
-/** The mirror light of a whole cloth (gloss.h). */
+/** The mirror light of a whole cloth (cloth_lobe.h). */
 typedef struct weft_gloss {
     float strength;                  /* share of the surface that mirrors, times F0 */
     float alpha_along, alpha_across; /* GGX, of the fibre's direction */
@@ -75,7 +75,8 @@ typedef struct weft_solve_method {
     /* Answers the few pixels that `solve` marked, at many times its cost; they come 16 at a time from
      * anywhere in a row.  NULL: there are none. */
     weft_solve_fn *search;
-    bool takes_gloss; /* uses samples->gloss where there is one */
+    bool takes_gloss;  /* uses samples->gloss where there is one */
+    bool takes_bounce; /* its answers are corrected for light from yarn to yarn (bounce.h) */
 } weft_solve_method;
 
 /** The methods; the default first; ends with NULL. */

@@ -121,10 +121,30 @@ static void finish_rows(void *context, int band, int row_begin, int row_end)
     }
 }
 
-static weft_err solve_all_rows(solve_job *job, weft_error *err)
+/* Light from yarn to yarn needs to know how large a pixel is: distant lights come without a camera. */
+static weft_err take_off_bounce(solve_job *job, const weft_solve_options *options, weft_pixel_scale pixel,
+                                weft_solve_run *run, weft_error *err)
+{
+    double mm_per_px;
+    const double begun = weft_clock_s();
+    if (!job->plan->method->takes_bounce || options->no_bounce || !job->cal->has_camera ||
+        !job->cal->camera.has_pose)
+        return WEFT_OK;
+    WEFT_TRY(weft_plane_scale(&job->cal->camera, pixel, options->height_mm, &mm_per_px, err));
+    WEFT_TRY(weft_bounce_take_off(job->maps, job->plan->cfa, mm_per_px, &run->bounce, err));
+    run->seconds.bounce = weft_clock_s() - begun;
+    if (run->bounce.done)
+        weft_explain("bounce: relief %.3f mm rms, %.1f %% of the sky is open", run->bounce.relief_mm,
+                     100 * run->bounce.openness);
+    return WEFT_OK;
+}
+
+static weft_err solve_all_rows(solve_job *job, const weft_solve_options *options, weft_pixel_scale pixel,
+                               weft_solve_run *run, weft_error *err)
 {
     const int height = job->maps->height;
     WEFT_TRY(weft_parallel_rows_progress(height, solve_rows, job, "solving", err));
+    WEFT_TRY(take_off_bounce(job, options, pixel, run, err));
     if (job->plan->cfa != WEFT_CFA_NONE)
         WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, err));
     weft_parallel_rows(height, finish_rows, job);
@@ -219,7 +239,7 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
         explain_gloss(&run->report, plan.gloss);
         solve_job job = {&plan, &plates, &inside, cal, maps};
         if (status == WEFT_OK)
-            status = solve_all_rows(&job, err);
+            status = solve_all_rows(&job, options, pixel, run, err);
     }
     run->seconds.solve = weft_clock_s() - clock;
     weft_incidence_fini(&incidence);

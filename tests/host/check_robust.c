@@ -2,7 +2,7 @@
 #include "tests/support/support.h"
 
 #include "core/mem.h"
-#include "host/solve/gloss.h"
+#include "host/solve/cloth_lobe.h"
 #include "host/solve/solve_row.h"
 #include "tests/host/dome.h"
 

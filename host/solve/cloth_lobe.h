@@ -11,8 +11,8 @@
  * roughness (Heitz 2014, eq. 99) and Schlick's F for F0 = 5 %.  The fibres run in one of two directions
  * across each other, warp or weft; each pixel takes the one that fits.
  */
-#ifndef WEFT_HOST_SOLVE_GLOSS_H
-#define WEFT_HOST_SOLVE_GLOSS_H
+#ifndef WEFT_HOST_SOLVE_CLOTH_LOBE_H
+#define WEFT_HOST_SOLVE_CLOTH_LOBE_H
 
 #include "host/solve/samples.h"
 

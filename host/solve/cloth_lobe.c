@@ -1,4 +1,4 @@
-#include "host/solve/gloss.h"
+#include "host/solve/cloth_lobe.h"
 
 #include "host/solve/normal_equations.h"
 
