@@ -7,14 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_CHANNELS (3 * WEFT_LIGHTS_MAX)
-
-typedef struct channel_names {
-    char text[MAX_CHANNELS][16];
-    const char *names[MAX_CHANNELS];
-} channel_names;
-
-static void name_channels(channel_names *channels, int n)
+void weft_light_channels_name(weft_light_channels *channels, int n)
 {
     for (int i = 0; i < n; i++) {
         snprintf(channels->text[i], sizeof channels->text[i], "light%02d.%c", (i / 3) & 0xff, "RGB"[i % 3]);
@@ -40,9 +33,9 @@ static weft_err check_gains(const float *gain, size_t n, const char *path, weft_
 
 weft_err weft_calibration_grid_load(const char *path, weft_calibration *cal, weft_error *err)
 {
-    channel_names channels;
+    weft_light_channels channels;
     weft_image image = {0};
-    name_channels(&channels, 3 * cal->n_lights);
+    weft_light_channels_name(&channels, 3 * cal->n_lights);
     weft_err status = weft_exr_read(path, channels.names, 3 * cal->n_lights, &image, err);
     if (status == WEFT_OK && (image.width != cal->grid.columns || image.height != cal->grid.rows))
         status = weft_fail(err, WEFT_ERR_MISMATCH, "%s: is %dx%d, but calibration.json says %dx%d nodes",
@@ -63,8 +56,8 @@ weft_err weft_calibration_grid_load(const char *path, weft_calibration *cal, wef
 
 weft_err weft_calibration_grid_save(const char *path, const weft_calibration *cal, weft_error *err)
 {
-    channel_names channels;
-    name_channels(&channels, 3 * cal->n_lights);
+    weft_light_channels channels;
+    weft_light_channels_name(&channels, 3 * cal->n_lights);
     const weft_image image = {cal->grid.columns, cal->grid.rows, 3 * cal->n_lights, cal->grid.gain};
     WEFT_TRY(check_gains(image.data, weft_calibration_grid_size(cal), path, err));
     return weft_exr_write(path, &image, channels.names, WEFT_EXR_FLOAT, err);

@@ -77,6 +77,7 @@ stage "calibrate lights" calibrate lights "$out/sets/white.set"
 stage "calibrate linearity" calibrate linearity "$out/sets/munsell.set"
 stage "calibrate white" calibrate white "$out/sets/munsell.set"
 stage "calibrate colour" calibrate colour "$out/sets/macbeth.set" --overlay "$out/pictures/macbeth-found.png"
+stage "calibration report" "$weft" calibrate report "$out/scanner.cal" -o "$out/report"
 for sample in "${samples[@]}"; do
     stage "solve $sample" "$weft" solve "$out/sets/$sample.set" -c "$out/scanner.cal" -o "$out/$sample.maps" --mm-per-px 0.125
 done

@@ -5,12 +5,14 @@
 #include "calibration/lens/lens_fit.h"
 #include "calibration/lens/lens_model.h"
 #include "calibration/lens/lens_module.h"
+#include "calibration/lens/lens_residuals.h"
 #include "core/json.h"
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/cli/board_picture.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct lens_args {
@@ -181,14 +183,31 @@ static json_t *board_json(const weft_board *board)
                      board->square_mm);
 }
 
+/* Four numbers a corner (u, v, du, dv), to a hundredth of a pixel; NULL when there is nothing to show. */
+static json_t *residuals_json(const lens_run *run, const weft_board_view *view)
+{
+    const int n = 4 * run->board.columns * run->board.rows;
+    double *const residuals = view->used ? weft_alloc((size_t)n, sizeof *residuals, NULL) : NULL;
+    json_t *numbers = NULL;
+    if (residuals &&
+        weft_lens_view_residuals(&run->board, view, &run->cal.camera, residuals, NULL) == WEFT_OK) {
+        for (int i = 0; i < n; i++) /* the place to a pixel, the residual to a thousandth */
+            residuals[i] = i % 4 < 2 ? round(residuals[i]) : round(1000 * residuals[i]) / 1000;
+        numbers = weft_json_numbers(residuals, n);
+    }
+    weft_free(residuals);
+    return numbers;
+}
+
 static json_t *lens_json(const lens_run *run)
 {
     const double *const s = run->lens.sigma;
     const weft_lens_opencv *opencv;
     json_t *const views = json_array();
     for (int i = 0; i < run->n_views; i++)
-        json_array_append_new(views, json_pack("{s:s, s:f, s:b}", "image", run->views[i].name, "rms_px",
-                                               run->views[i].rms_px, "used", (int)run->views[i].used));
+        json_array_append_new(views, json_pack("{s:s, s:f, s:b, s:o*}", "image", run->views[i].name, "rms_px",
+                                               run->views[i].rms_px, "used", (int)run->views[i].used,
+                                               "corners", residuals_json(run, &run->views[i])));
     json_t *const report = json_pack(
         "{s:f, s:f, s:i, s:f, s:o, s:{s:f, s:f, s:f, s:f, s:o}, s:o, s:O}", "rms_px", run->cal.camera.rms_px,
         "held_out_px", run->lens.held_out_px, "views_used", run->lens.n_used, "coverage", run->lens.coverage,

@@ -3,6 +3,7 @@
 
 #include "calibration/calibration_report.h"
 #include "calibration/lights/light_fit.h"
+#include "calibration/lights/white_sheet_file.h"
 #include "core/csv.h"
 #include "core/file.h"
 #include "core/json.h"
@@ -259,6 +260,12 @@ static void keep_measured_white(const weft_calibration *former, weft_calibration
                sizeof cal->lights[l].white_balance);
 }
 
+static weft_err keep_sheet(const char *folder, const weft_white_sheet *sheet, weft_error *err)
+{
+    WEFT_TRY(weft_folder_create(folder, err));
+    return weft_white_sheet_save(folder, sheet, err);
+}
+
 static weft_err fit(const weft_invocation *inv, const lights_args *args, const weft_set *set,
                     weft_calibration *cal, weft_error *err)
 {
@@ -269,6 +276,9 @@ static weft_err fit(const weft_invocation *inv, const lights_args *args, const w
     WEFT_TRY(load_sheet(set, &sheet, err));
     const weft_calibration former = *cal; /* its numbers; what it points to is not used */
     weft_err status = weft_light_fit(&cal->camera, &sheet, &options, cal, &report, err);
+    if (status ==
+        WEFT_OK) /* beside the calibration, for its report; first, so that none is of older lights */
+        status = keep_sheet(args->output, &sheet, err);
     weft_white_sheet_fini(&sheet);
     if (status != WEFT_OK)
         return weft_prefix(err, status, "%s", set->folder);

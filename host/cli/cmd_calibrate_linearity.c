@@ -159,6 +159,30 @@ static weft_err judge(const weft_chart_session *session, const weft_chart_option
     return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", session->set.folder);
 }
 
+/* Every grey: its reflectance, and the mean deviation from the straight line over the lights that see it. */
+static json_t *greys_json(const weft_chart_session *session, const judgement *j)
+{
+    const weft_chart *const chart = session->chart;
+    json_t *const greys = json_array();
+    for (int p = 0; p < chart->columns * chart->rows; p++) {
+        double sum[WEFT_SITES] = {0};
+        int n = 0;
+        for (int light = 0; light < session->n_lights; light++) {
+            n += j->fits[light].usable[p];
+            for (int s = 0; s < WEFT_SITES && j->fits[light].usable[p]; s++)
+                sum[s] += j->fits[light].deviation[p][s];
+        }
+        for (int s = 0; s < WEFT_SITES; s++)
+            sum[s] /= n > 0 ? n : 1;
+        if (n > 0)
+            json_array_append_new(greys,
+                                  json_pack("{s:s, s:f, s:o}", "name", chart->patches[p].name, "reflectance",
+                                            weft_munsell_reflectance(chart->patches[p].munsell_value),
+                                            "deviation", weft_json_numbers(sum, WEFT_SITES)));
+    }
+    return greys;
+}
+
 static json_t *report(const weft_chart_session *session, const weft_chart_options *options,
                       const judgement *j)
 {
@@ -177,6 +201,7 @@ static json_t *report(const weft_chart_session *session, const weft_chart_option
     json_object_set_new(r, "max_deviation", json_real(session->cal.linearity.max_deviation));
     json_object_set_new(r, "illumination", json_string(weft_chart_light_source_name(j->source)));
     json_object_set_new(r, "lights", lights);
+    json_object_set_new(r, "greys", greys_json(session, j));
     json_object_set_new(r, "greys_max_deviation", json_real(j->linearity.max_deviation));
     if (j->n_series)
         json_object_set_new(r, "series",

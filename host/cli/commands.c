@@ -2,6 +2,7 @@
 
 extern const weft_command weft_cmd_brdf;
 extern const weft_command weft_cmd_calibrate_colour;
+extern const weft_command weft_cmd_calibrate_report;
 extern const weft_command weft_cmd_calibrate_linearity;
 extern const weft_command weft_cmd_calibrate_white;
 extern const weft_command weft_cmd_capture;
@@ -45,6 +46,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_calibrate_white,
     &weft_cmd_calibrate_lights,
     &weft_cmd_calibrate_colour,
+    &weft_cmd_calibrate_report,
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_compare,

@@ -347,6 +347,30 @@ static void test_patches_left_out_by_hand(void **state)
     assert_int_equal(runf("weft calibrate colour %s -o %s --force --exclude 25", set, folder), 2);
 }
 
+static void test_the_report_is_written(void **state)
+{
+    (void)state;
+    char folder[256], report[256], page[300];
+    snprintf(folder, sizeof folder, "%s", weft_test_path("colour.cal"));
+    snprintf(report, sizeof report, "%s", weft_test_path("report"));
+    snprintf(page, sizeof page, "%s/index.html", report);
+    assert_int_equal(runf("weft calibrate report %s -o %s", folder, report), 0);
+    char *text;
+    size_t n;
+    assert_ok(weft_file_read(page, 1 << 24, &text, &n, err));
+    assert_non_null(strstr(text, "macbeth ohta1997, method matrix"));
+    assert_non_null(strstr(text, "The Munsell line") ? text : strstr(text, "Not checked"));
+    weft_free(text);
+    assert_int_equal(runf("weft calibrate report %s -o %s", folder, report), 1); /* is there */
+    assert_int_equal(runf("weft calibrate report %s -o %s --force --json", folder, report), 0);
+    assert_int_equal(runf("weft calibrate report %s -o %s", folder, weft_test_path("one.html")), 0);
+    assert_true(weft_file_exists(weft_test_path("one.html")));
+    assert_int_equal(
+        runf("weft calibrate report %s -o %s", weft_test_path("none.cal"), weft_test_path("no.html")), 1);
+    assert_false(weft_file_exists(weft_test_path("no.html")));
+    assert_int_equal(runf("weft calibrate report %s", folder), 2);
+}
+
 static void test_corners_by_hand_give_the_same(void **state)
 {
     (void)state;
@@ -436,6 +460,7 @@ int main(void)
         cmocka_unit_test(test_colour_is_that_of_the_spectra),
         cmocka_unit_test(test_methods_and_exposures),
         cmocka_unit_test(test_patches_left_out_by_hand),
+        cmocka_unit_test(test_the_report_is_written),
         cmocka_unit_test(test_corners_by_hand_give_the_same),
         cmocka_unit_test(test_a_slight_gamma_is_seen_in_one_exposure),
         cmocka_unit_test(test_refusals_leave_the_calibration_alone),
