@@ -16,7 +16,7 @@
 #define BATTERY_LOW   20
 /* The frame that tells the size of frames. */
 #define LEARN_S          (1.0 / 60)
-#define LEARN_DEADLINE_S 10
+#define LEARN_DEADLINE_S 6
 
 /* ---- who it is ---- */
 
