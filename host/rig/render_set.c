@@ -137,6 +137,9 @@ static weft_err begin_set(const renderer *to, render_set *r, const char *folder,
     WEFT_TRY(weft_file_refuse_existing(folder, to->plan->force, err));
     WEFT_TRY(weft_folder_create(folder, err));
     WEFT_TRY(weft_set_init(set, folder, err));
+    weft_free(set->name);
+    if (!(set->name = weft_strdup(r->name, err)))
+        return WEFT_ERR_NOMEM;
     set->width = to->scene->camera.width;
     set->height = to->scene->camera.height;
     set->cfa = WEFT_CFA_RGGB;

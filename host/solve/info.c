@@ -65,6 +65,15 @@ static json_t *gloss_json(const weft_gloss *g)
                      57.29577951308232 * atan2((double)g->fibre[0][1], (double)g->fibre[0][0]));
 }
 
+/* [light][colour]: what the strip gave over what the calibration says. */
+static json_t *drift_json(const weft_solve_run *run)
+{
+    json_t *const gains = json_array();
+    for (int j = 0; j < run->n_drift; j++)
+        json_array_append_new(gains, weft_json_numbers(run->drift.gain[j], 3));
+    return json_pack("{s:o, s:f}", "gain", gains, "sigma", run->drift.sigma);
+}
+
 static json_t *result_json(const weft_maps *maps, const weft_solve_run *run)
 {
     const size_t n = (size_t)maps->width * (size_t)maps->height;
@@ -88,6 +97,8 @@ static json_t *result_json(const weft_maps *maps, const weft_solve_run *run)
         json_object_set_new(result, "bounce",
                             json_pack("{s:f, s:f}", "relief_mm", run->bounce.relief_mm, "openness_mean",
                                       run->bounce.openness));
+    if (result && run->n_drift)
+        json_object_set_new(result, "drift", drift_json(run));
     return result;
 }
 

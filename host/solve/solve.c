@@ -207,6 +207,31 @@ static void explain_gloss(const weft_gloss_report *report, const weft_gloss *glo
             57.29577951308232 * atan2((double)gloss->fibre[0][1], (double)gloss->fibre[0][0]));
 }
 
+/* Takes the lamps' drift since the calibration from the white strip, where the set has one. */
+static weft_err follow_drift(const weft_set *set, const weft_light_plates *plates, weft_pixel_scale pixel,
+                             weft_calibration *cal, weft_solve_run *run, weft_error *err)
+{
+    weft_strip strip;
+    bool present;
+    double least = 1, most = 1;
+    WEFT_TRY(weft_strip_of_set(set, &strip, &present, err));
+    if (!present)
+        return WEFT_OK;
+    if (has_near_light(cal) && !cal->camera.has_pose)
+        return weft_fail(err, WEFT_ERR_MISSING, "the white strip needs the camera's pose");
+    WEFT_TRY(weft_strip_measure(plates, pixel, cal, &strip, &run->drift, err));
+    run->n_drift = plates->n;
+    for (int j = 0; j < plates->n; j++) {
+        for (int c = 0; c < 3; c++)
+            cal->lights[j].intensity[c] *= run->drift.gain[j][c];
+        least = fmin(least, run->drift.gain[j][1]);
+        most = fmax(most, run->drift.gain[j][1]);
+    }
+    weft_explain("white strip: the lights give %.4f to %.4f of what they were calibrated with (+- %.4f)",
+                 least, most, run->drift.sigma);
+    return WEFT_OK;
+}
+
 /* All at sensor geometry. */
 static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal,
                                 const weft_solve_options *options, weft_pixel_scale pixel, weft_maps *maps,
@@ -215,6 +240,7 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     weft_light_plates plates = {0};
     weft_mask inside = {0};
     weft_incidence incidence = {0};
+    weft_calibration drifted = *cal; /* its numbers; what it points to stays cal's */
     double clock = weft_clock_s();
     weft_err status = load_mask(set, options->half, &inside, err);
     if (status == WEFT_OK)
@@ -222,8 +248,10 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     run->seconds.read = weft_clock_s() - clock;
     clock = weft_clock_s();
     if (status == WEFT_OK)
-        status =
-            weft_incidence_init(&incidence, cal, plates.width, plates.height, pixel, options->height_mm, err);
+        status = follow_drift(set, &plates, pixel, &drifted, run, err);
+    if (status == WEFT_OK)
+        status = weft_incidence_init(&incidence, &drifted, plates.width, plates.height, pixel,
+                                     options->height_mm, err);
     if (status == WEFT_OK)
         status = make_maps(maps, plates.width, plates.height, err);
     if (status == WEFT_OK) {
