@@ -111,7 +111,7 @@ static weft_err add_strip(const renderer *to, weft_set *set, weft_error *err)
 {
     const double *const s = to->scene->setup.strip_mm;
     double u[4], v[4];
-    if (!(s[0] < s[2]))
+    if (!(s[0] < s[2]) || strcmp(set->name, "white") == 0) /* the sheet lies over it */
         return WEFT_OK;
     for (int k = 0; k < 4; k++)
         if (!weft_camera_project(&to->scene->camera, (weft_vec3){s[k & 1 ? 2 : 0], s[k & 2 ? 3 : 1], 0},

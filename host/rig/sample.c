@@ -319,7 +319,8 @@ weft_err weft_rig_sample_init(weft_rig_sample *sample, const weft_rig_scene *sce
     *sample = (weft_rig_sample){0};
     snprintf(sample->name, sizeof sample->name, "%s", name);
     WEFT_TRY(init_by_name(sample, scene, name, err));
-    add_strip(sample, &scene->setup);
+    if (strcmp(name, "white") != 0) /* the sheet lies over it */
+        add_strip(sample, &scene->setup);
     return WEFT_OK;
 }
 

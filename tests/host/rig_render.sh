@@ -18,8 +18,10 @@ import json
 a, c = json.load(open("a/white.set/set.json")), json.load(open("c/white.set/set.json"))
 assert len(a["frames"]) == 11 and len(c["frames"]) == 22 and a["state"] == "complete", a
 assert {f["exposure_s"] for f in c["frames"]} == {0.01, 0.02}
-left, top, right, bottom = a["strip"]["rect_px"]
-assert 0 < left < 25 and 283 < right < 308 and 0 < top < bottom < 24, a["strip"]
+board = json.load(open("a/board-3.set/set.json"))
+left, top, right, bottom = board["strip"]["rect_px"]
+assert 0 < left < 25 and 283 < right < 308 and 0 < top < bottom < 24, board["strip"]
+assert "strip" not in a  # the sheet lies over it
 assert json.load(open("a/truth.cal/calibration.json"))["camera"]["width"] == 308
 PY
 expect 1 'there already' "$rig" --render a --size 308x204 --sample white
