@@ -19,9 +19,9 @@ static const struct {
     int bits;
     weft_packing packing;
 } depths[] = {
-    {"16", 16, WEFT_PACKING_16},   {"14", 14, WEFT_PACKING_16},         {"12", 12, WEFT_PACKING_16},
-    {"12p", 12, WEFT_PACKING_12P}, {"12Packed", 12, WEFT_PACKING_12GV}, {"10", 10, WEFT_PACKING_16},
-    {"8", 8, WEFT_PACKING_8},
+    {"16", 16, WEFT_PACKING_16}, {"14", 14, WEFT_PACKING_16}, {"14p", 14, WEFT_PACKING_P},
+    {"12", 12, WEFT_PACKING_16}, {"12p", 12, WEFT_PACKING_P}, {"12Packed", 12, WEFT_PACKING_12GV},
+    {"10", 10, WEFT_PACKING_16}, {"10p", 10, WEFT_PACKING_P}, {"8", 8, WEFT_PACKING_8},
 };
 
 enum { N_ORDERS = sizeof orders / sizeof orders[0], N_DEPTHS = sizeof depths / sizeof depths[0] };
@@ -82,17 +82,27 @@ size_t weft_raw_format_bytes(const weft_raw_format *format, size_t n)
         return 2 * n;
     case WEFT_PACKING_8:
         return n;
-    case WEFT_PACKING_12P:
+    case WEFT_PACKING_P:
     case WEFT_PACKING_12GV:
         break;
     }
-    return (3 * n + 1) / 2;
+    return ((size_t)format->bits * n + 7) / 8;
 }
 
-static uint16_t sample_12p(const uint8_t *bytes, size_t i)
+/* One sample after the other without gaps; never reads behind the last byte of n samples. */
+static void unpack_bits(const uint8_t *bytes, size_t n, int bits, uint16_t *samples)
 {
-    const uint8_t *const b = bytes + i / 2 * 3;
-    return (uint16_t)(i % 2 == 0 ? b[0] | (b[1] & 15) << 8 : b[1] >> 4 | b[2] << 4);
+    uint32_t held = 0;
+    int n_held = 0;
+    for (size_t i = 0; i < n; i++) {
+        while (n_held < bits) {
+            held |= (uint32_t)*bytes++ << n_held;
+            n_held += 8;
+        }
+        samples[i] = (uint16_t)(held & ((1u << bits) - 1));
+        held >>= bits;
+        n_held -= bits;
+    }
 }
 
 static uint16_t sample_12gv(const uint8_t *bytes, size_t i)
@@ -112,9 +122,8 @@ void weft_raw_format_unpack(const weft_raw_format *format, const uint8_t *bytes,
         for (size_t i = 0; i < n; i++)
             samples[i] = bytes[i];
         return;
-    case WEFT_PACKING_12P:
-        for (size_t i = 0; i < n; i++)
-            samples[i] = sample_12p(bytes, i);
+    case WEFT_PACKING_P:
+        unpack_bits(bytes, n, format->bits, samples);
         return;
     case WEFT_PACKING_12GV:
         for (size_t i = 0; i < n; i++)

@@ -10,7 +10,7 @@
 typedef enum weft_packing {
     WEFT_PACKING_16,   /* little-endian 16 bit, right-aligned: 10, 12, 14 and 16 bit formats */
     WEFT_PACKING_8,    /* a byte each */
-    WEFT_PACKING_12P,  /* PFNC "12p": two samples in three bytes, low bits first */
+    WEFT_PACKING_P,    /* PFNC "10p", "12p", "14p": bit after bit, low bits first */
     WEFT_PACKING_12GV, /* GigE Vision "12Packed": high bytes outside, low nibbles in the middle byte */
 } weft_packing;
 

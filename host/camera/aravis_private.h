@@ -8,6 +8,13 @@
 #include <arv.h>
 #include <stdatomic.h>
 
+/** What the address may say behind a comma: "192.168.1.20,packet=1400,resend=off,line=Line0". */
+typedef struct aravis_wishes {
+    int packet_bytes; /* 0: the largest that passes */
+    int resend;       /* 1 always, 0 never, -1: never on loopback, else always */
+    char line[32];    /* input of the trigger; empty: the first there is */
+} aravis_wishes;
+
 typedef struct aravis_camera {
     ArvCamera *camera;
     ArvDevice *device; /* borrowed from `camera` */
@@ -16,6 +23,13 @@ typedef struct aravis_camera {
     bool loopback;     /* GigE Vision on 127.x.x.x */
     bool stale;        /* a frame may still come for a trigger that was given up: start a new stream */
     bool has_gain;
+    aravis_wishes wishes;
+    bool has_last_id;
+    uint64_t last_id; /* of the stream's last frame */
+    double triggered_s;
+    char wire_source[32];        /* the input line of WEFT_TRIGGER_WIRE */
+    weft_camera_trigger trigger; /* as the device is set */
+    weft_camera_region region;   /* likewise */
     weft_gain_scale gain_scale;
     double gain_unit;
     weft_raw_format format;
@@ -40,6 +54,15 @@ weft_err aravis_fail(const aravis_camera *a, GError *error, const char *doing, w
 
 /** Writes the exposure to the device and reads back what it made of it. */
 weft_err aravis_set_exposure(const aravis_camera *a, double exposure_s, double *achieved_s, weft_error *err);
+
+/** Sets the source of the trigger and reads it back. */
+weft_err aravis_set_trigger_source(aravis_camera *a, const char *source, weft_error *err);
+
+/** What is wrong with a frame of this status, and the remedy; "" for a whole one. */
+const char *aravis_status_words(ArvBufferStatus status);
+
+/** Reads what the address says behind its first comma.  @return WEFT_ERR_USAGE naming the word */
+weft_err aravis_read_wishes(const char *words, aravis_wishes *wishes, weft_error *err);
 
 /** The `expose` of the backend. */
 weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle, void *idle_context,

@@ -15,12 +15,16 @@
 enum {
     N_BUFFERS = 4,
     SLICE_US = 50000, /* between two calls of `idle` */
+    REASON_SIZE = sizeof((weft_captured_frame *)0)->reason,
 };
 
 #define GVCP_PORT 3956
 /* How long a silent camera is asked whether it lives, ending with the deadline. */
 #define PING_S     1.2
 #define PING_TRIES 3
+/* A frame that is whole sooner after its trigger than its exposure lasts is of another trigger.  Half of this
+ * is what the simulated camera's clock may be off the wall clock. */
+#define EARLY_S 0.1
 /* The first frame of a stream has taken up to 0.3 s on loopback, and half a second on sleeping cameras. */
 #define FIRST_FRAME_S 3.0
 
@@ -30,22 +34,30 @@ void aravis_stop(aravis_camera *a)
         arv_camera_stop_acquisition(a->camera, NULL); /* a camera that does not answer is stopped already */
     g_clear_object(&a->stream);
     a->stale = false;
+    a->has_last_id = false;
 }
 
 static weft_err set_packet_size(aravis_camera *a, weft_error *err)
 {
     if (!arv_camera_is_gv_device(a->camera))
         return WEFT_OK;
-    if (a->loopback) {
+    if (a->loopback)
+        arv_camera_gv_set_stream_options(a->camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+    guint bytes = 0;
+    if (a->loopback || a->wishes.packet_bytes) {
         /* A packet of 9 kB is charged 16 kB of socket memory; the largest there are lose nothing. */
         enum { LOOPBACK_BYTES = 65000 };
+        const gint wanted = a->wishes.packet_bytes ? a->wishes.packet_bytes : LOOPBACK_BYTES;
         arv_camera_gv_set_packet_size_adjustment(a->camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-        arv_camera_gv_set_stream_options(a->camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
-        ARAVIS_TRY(a, "setting the packet size",
-                   arv_camera_gv_set_packet_size(a->camera, LOOPBACK_BYTES, &error));
+        ARAVIS_TRY(a, "setting the packet size", arv_camera_gv_set_packet_size(a->camera, wanted, &error));
+        ARAVIS_TRY(a, "reading back the packet size",
+                   bytes = arv_camera_gv_get_packet_size(a->camera, &error));
+        if (a->wishes.packet_bytes && bytes != (guint)wanted)
+            return weft_fail(err, WEFT_ERR_RANGE,
+                             "camera %s: packets of %d bytes are not possible, it takes %u", a->address,
+                             wanted, bytes);
         return WEFT_OK;
     }
-    guint bytes = 0;
     ARAVIS_TRY(a, "finding the largest packet that passes",
                bytes = arv_camera_gv_auto_packet_size(a->camera, &error));
     if (bytes < 8000)
@@ -66,10 +78,10 @@ static weft_err create_stream(aravis_camera *a, weft_error *err)
         /* Two frames, but never little: Aravis' own choice for a frame of one packet loses that packet. */
         enum { LEAST = 4 << 20, MOST = 256 << 20 };
         const gint bytes = payload > MOST / 2 ? MOST : payload > LEAST / 2 ? (gint)(2 * payload) : LEAST;
+        const bool resend = a->wishes.resend < 0 ? !a->loopback : a->wishes.resend != 0;
         g_object_set(a->stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
                      bytes, "packet-resend",
-                     a->loopback ? ARV_GV_STREAM_PACKET_RESEND_NEVER : ARV_GV_STREAM_PACKET_RESEND_ALWAYS,
-                     NULL);
+                     resend ? ARV_GV_STREAM_PACKET_RESEND_ALWAYS : ARV_GV_STREAM_PACKET_RESEND_NEVER, NULL);
     }
     for (int i = 0; i < N_BUFFERS; i++)
         arv_stream_push_buffer(a->stream, arv_buffer_new_allocate(payload));
@@ -120,19 +132,29 @@ static weft_err ping(aravis_camera *a, weft_error *err)
     return WEFT_OK;
 }
 
+/* Triggers, or says by a call of `idle` that the pulse on the wire may come. */
+static weft_err trigger(aravis_camera *a, weft_camera_trigger how, weft_camera_idle_fn *idle,
+                        void *idle_context, weft_error *err)
+{
+    a->stale = true;
+    a->triggered_s = weft_clock_s();
+    if (how == WEFT_TRIGGER_WIRE)
+        return idle ? idle(idle_context, err) : WEFT_OK;
+    ARAVIS_TRY(a, "triggering a frame", arv_camera_software_trigger(a->camera, &error));
+    return WEFT_OK;
+}
+
 /* Triggers and waits at most wait_s for whatever comes; *buffer is NULL when nothing did.  A silent camera
  * is asked whether it lives early enough for the answer to come before the deadline. */
-static weft_err take(aravis_camera *a, double wait_s, weft_camera_idle_fn *idle, void *idle_context,
-                     ArvBuffer **buffer, weft_error *err)
+static weft_err take(aravis_camera *a, weft_camera_trigger how, double wait_s, weft_camera_idle_fn *idle,
+                     void *idle_context, ArvBuffer **buffer, weft_error *err)
 {
     ArvBuffer *old;
     *buffer = NULL;
     while ((old = arv_stream_try_pop_buffer(a->stream)) != NULL)
         arv_stream_push_buffer(a->stream, old);
     WEFT_TRY(check_there(a, err));
-    a->stale = true;
-    ARAVIS_TRY(a, "triggering a frame", arv_camera_software_trigger(a->camera, &error));
-
+    WEFT_TRY(trigger(a, how, idle, idle_context, err));
     const double start_s = weft_clock_s(), ping_after_s = wait_s - PING_S;
     bool pinged = ping_after_s < a->set.exposure_s + PING_S; /* no time for it: a short deadline is enough */
     for (double elapsed_s = 0; !*buffer && elapsed_s < wait_s; elapsed_s = weft_clock_s() - start_s) {
@@ -151,6 +173,27 @@ static weft_err take(aravis_camera *a, double wait_s, weft_camera_idle_fn *idle,
     return WEFT_OK;
 }
 
+enum { LAST_OF_16_BITS = 65535 };
+
+/* The number of a frame comes with its first packet: a damaged one may bear that of a frame before. */
+static void note_id(aravis_camera *a, ArvBuffer *buffer)
+{
+    const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
+    a->has_last_id = whole || (a->has_last_id && a->last_id != LAST_OF_16_BITS);
+    a->last_id = whole ? arv_buffer_get_frame_id(buffer) : a->last_id + 1;
+}
+
+/* Frames that the camera has counted since the last one and that nobody asked for: its numbers have 16 bits,
+ * which leave out 0, or 64. */
+static uint64_t uncalled(const aravis_camera *a, uint64_t id)
+{
+    if (!a->has_last_id || id == a->last_id + 1)
+        return 0;
+    if (a->last_id <= LAST_OF_16_BITS && id <= a->last_id)
+        return id + LAST_OF_16_BITS - a->last_id - 1;
+    return id - a->last_id - 1;
+}
+
 /* The socket buffer grows only when the first frame's leader has come, so the first frame often lacks
  * packets: take one with the shortest exposure and forget it. */
 static weft_err throw_one_away(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context,
@@ -159,7 +202,14 @@ static weft_err throw_one_away(aravis_camera *a, weft_camera_idle_fn *idle, void
     ArvBuffer *buffer = NULL;
     double achieved_s;
     WEFT_TRY(aravis_set_exposure(a, a->exposure_min_s, &achieved_s, err));
-    WEFT_TRY(take(a, FIRST_FRAME_S, idle, idle_context, &buffer, err));
+    if (a->trigger == WEFT_TRIGGER_WIRE) /* nobody would send a pulse for this one */
+        WEFT_TRY(aravis_set_trigger_source(a, "Software", err));
+    WEFT_TRY(take(a, WEFT_TRIGGER_SOFTWARE, FIRST_FRAME_S, a->trigger == WEFT_TRIGGER_WIRE ? NULL : idle,
+                  idle_context, &buffer, err)); /* a call of idle would mean "armed" */
+    if (a->trigger == WEFT_TRIGGER_WIRE)
+        WEFT_TRY(aravis_set_trigger_source(a, a->wire_source, err));
+    if (buffer)
+        note_id(a, buffer);
     if (buffer)
         arv_stream_push_buffer(a->stream, buffer);
     return aravis_set_exposure(a, a->set.exposure_s, &achieved_s, err);
@@ -183,22 +233,29 @@ static weft_err start(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_co
         a->address);
 }
 
-static const char *status_words(ArvBufferStatus status)
+const char *aravis_status_words(ArvBufferStatus status)
 {
-    switch (status) {
-    case ARV_BUFFER_STATUS_TIMEOUT:
-        return "its last packets did not come";
-    case ARV_BUFFER_STATUS_MISSING_PACKETS:
-        return "packets were lost";
-    case ARV_BUFFER_STATUS_WRONG_PACKET_ID:
-        return "packets came with wrong numbers";
-    case ARV_BUFFER_STATUS_SIZE_MISMATCH:
-        return "it is larger than agreed";
-    case ARV_BUFFER_STATUS_ABORTED:
-        return "the stream was stopped";
-    default:
-        return "it was not filled";
-    }
+    static const struct {
+        ArvBufferStatus status;
+        const char *words;
+    } rows[] = {
+        {ARV_BUFFER_STATUS_SUCCESS, ""},
+        {ARV_BUFFER_STATUS_CLEARED, "it was not filled; if this repeats, switch the camera off and on"},
+        {ARV_BUFFER_STATUS_TIMEOUT,
+         "the rest of it did not come in time; raise net.core.rmem_max, use jumbo frames and a good cable"},
+        {ARV_BUFFER_STATUS_MISSING_PACKETS,
+         "packets were lost; raise net.core.rmem_max, use jumbo frames, keep other traffic away"},
+        {ARV_BUFFER_STATUS_WRONG_PACKET_ID,
+         "packets came with wrong numbers; look for a second program that reads this camera"},
+        {ARV_BUFFER_STATUS_SIZE_MISMATCH,
+         "it is larger than agreed; another program has changed the camera's settings"},
+        {ARV_BUFFER_STATUS_FILLING, "it was still being filled; the computer is too slow for this rate"},
+        {ARV_BUFFER_STATUS_ABORTED, "the stream was stopped; check the camera's cable and power"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        if (rows[i].status == status)
+            return rows[i].words;
+    return "its status is not known; the camera or Aravis is newer than this program";
 }
 
 static uint64_t missing_packets(const aravis_camera *a)
@@ -210,12 +267,32 @@ static uint64_t missing_packets(const aravis_camera *a)
 }
 
 /* Whether the buffer is a whole frame of the kind that was asked for; else the reason in words. */
-static bool is_whole(const aravis_camera *a, ArvBuffer *buffer, uint64_t n_missing, char reason[128])
+/* A frame of another trigger than ours, as far as that can be known; else false. */
+static bool is_uncalled(const aravis_camera *a, ArvBuffer *buffer, double age_s, char reason[REASON_SIZE])
+{
+    const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
+    const uint64_t n = whole ? uncalled(a, arv_buffer_get_frame_id(buffer)) : 0;
+    if (n > 0)
+        snprintf(reason, REASON_SIZE,
+                 "the camera counts %" PRIu64
+                 " frames that nobody asked for: is something else triggering it?",
+                 n);
+    else if (age_s < a->set.exposure_s - EARLY_S)
+        snprintf(reason, REASON_SIZE,
+                 "a frame came that nobody asked for, %.2f s after the trigger of an exposure of %.2f s: is "
+                 "something else triggering the camera?",
+                 age_s, a->set.exposure_s);
+    else
+        return false;
+    return true;
+}
+
+static bool is_whole(const aravis_camera *a, ArvBuffer *buffer, uint64_t n_missing, char reason[REASON_SIZE])
 {
     const ArvBufferStatus status = arv_buffer_get_status(buffer);
     if (status != ARV_BUFFER_STATUS_SUCCESS) {
-        snprintf(reason, 128, "the frame is incomplete: %s (%" PRIu64 " missing)", status_words(status),
-                 n_missing);
+        snprintf(reason, REASON_SIZE, "the frame is incomplete (%" PRIu64 " packets missing): %s", n_missing,
+                 aravis_status_words(status));
         return false;
     }
     size_t size = 0;
@@ -224,7 +301,7 @@ static bool is_whole(const aravis_camera *a, ArvBuffer *buffer, uint64_t n_missi
     if (arv_buffer_get_image_pixel_format(buffer) != a->code ||
         arv_buffer_get_image_width(buffer) != a->info->width ||
         arv_buffer_get_image_height(buffer) != a->info->height || size < wanted) {
-        snprintf(reason, 128, "the frame is %d x %d of format 0x%08x, not %d x %d %s",
+        snprintf(reason, REASON_SIZE, "the frame is %d x %d of format 0x%08x, not %d x %d %s",
                  arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer),
                  (unsigned)arv_buffer_get_image_pixel_format(buffer), a->info->width, a->info->height,
                  a->format.name);
@@ -264,7 +341,7 @@ weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle
     frame->gain = a->set.gain;
     frame->reason[0] = '\0';
     const uint64_t missing_before = missing_packets(a);
-    WEFT_TRY(take(a, a->set.exposure_s + deadline_s, idle, idle_context, &buffer, err));
+    WEFT_TRY(take(a, a->trigger, a->set.exposure_s + deadline_s, idle, idle_context, &buffer, err));
     if (!buffer) {
         frame->status = WEFT_FRAME_TIMEOUT;
         snprintf(frame->reason, sizeof frame->reason, "no frame came within %.1f s after the exposure",
@@ -273,12 +350,17 @@ weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle
     }
     weft_err status = WEFT_OK;
     frame->sequence = arv_buffer_get_frame_id(buffer);
-    if (is_whole(a, buffer, missing_packets(a) - missing_before, frame->reason)) {
+    const double age_s = weft_clock_s() - a->triggered_s;
+    if (is_uncalled(a, buffer, age_s, frame->reason)) {
+        frame->status = WEFT_FRAME_INCOMPLETE;
+        a->stale = true; /* whose frame comes next is not known either */
+    } else if (is_whole(a, buffer, missing_packets(a) - missing_before, frame->reason)) {
         frame->status = WEFT_FRAME_COMPLETE;
         status = fill_mosaic(a, buffer, &frame->mosaic, err);
     } else {
         frame->status = WEFT_FRAME_INCOMPLETE;
     }
+    note_id(a, buffer);
     arv_stream_push_buffer(a->stream, buffer);
     return status;
 }

@@ -146,7 +146,8 @@ static weft_err set_format(aravis_camera *a, weft_error *err)
     return WEFT_OK;
 }
 
-static weft_err set_full_region(aravis_camera *a, weft_error *err)
+/* @param wanted  width 0: the whole sensor */
+static weft_err set_region(aravis_camera *a, const weft_camera_region *wanted, weft_error *err)
 {
     gint x, y, width, height, got_width, got_height, least;
     if (arv_camera_is_binning_available(a->camera, NULL))
@@ -160,16 +161,28 @@ static weft_err set_full_region(aravis_camera *a, weft_error *err)
     if (width < 2 || height < 2 || width > WEFT_IMAGE_MAX_SIDE || height > WEFT_IMAGE_MAX_SIDE)
         return weft_fail(err, WEFT_ERR_PROTOCOL, "camera %s: says its frames can be %d x %d", a->address,
                          width, height);
-    ARAVIS_TRY(a, "setting the region", arv_camera_set_region(a->camera, 0, 0, width, height, &error));
+    weft_camera_region r = {.width = width, .height = height};
+    if (wanted->width > 0)
+        r = *wanted;
+    if (r.x < 0 || r.y < 0 || r.width < 2 || r.height < 2 || r.width > width - r.x ||
+        r.height > height - r.y || ((r.x | r.y | r.width | r.height) & 1 && wanted->width > 0))
+        return weft_fail(
+            err, WEFT_ERR_RANGE,
+            "camera %s: a region of %d x %d at %d, %d is not possible: even numbers inside %d x %d",
+            a->address, r.width, r.height, r.x, r.y, width, height);
+    ARAVIS_TRY(a, "setting the region",
+               arv_camera_set_region(a->camera, r.x, r.y, r.width, r.height, &error));
     ARAVIS_TRY(a, "reading back the region",
                arv_camera_get_region(a->camera, &x, &y, &got_width, &got_height, &error));
-    if (x != 0 || y != 0 || got_width != width || got_height != height)
-        return weft_fail(err, WEFT_ERR_PROTOCOL,
-                         "camera %s: stays at a region of %d x %d at %d, %d when told "
-                         "%d x %d at 0, 0",
-                         a->address, got_width, got_height, x, y, width, height);
-    a->info->width = width;
-    a->info->height = height;
+    if (x != r.x || y != r.y || got_width != r.width || got_height != r.height)
+        return weft_fail(
+            err, WEFT_ERR_RANGE,
+            "camera %s: makes a region of %d x %d at %d, %d when told %d x %d at %d, %d; ask for "
+            "what it makes",
+            a->address, got_width, got_height, x, y, r.width, r.height, r.x, r.y);
+    a->info->width = r.width;
+    a->info->height = r.height;
+    a->region = *wanted;
     return WEFT_OK;
 }
 
@@ -193,19 +206,62 @@ static weft_err switch_off_automatics(const aravis_camera *a, weft_error *err)
     return WEFT_OK;
 }
 
-static weft_err set_software_trigger(const aravis_camera *a, weft_error *err)
+weft_err aravis_set_trigger_source(aravis_camera *a, const char *source, weft_error *err)
 {
-    const char *source = NULL;
+    const char *got = NULL;
+    ARAVIS_TRY(a, "setting the trigger's source", arv_camera_set_trigger_source(a->camera, source, &error));
+    ARAVIS_TRY(a, "reading back the trigger", got = arv_camera_get_trigger_source(a->camera, &error));
+    if (!got || strcmp(got, source) != 0)
+        return weft_fail(err, WEFT_ERR_PROTOCOL, "camera %s: stays at trigger source %s when told %s",
+                         a->address, got ? got : "?", source);
+    return WEFT_OK;
+}
+
+/* The input line of the trigger: the one that was wished for, or the first that the camera has. */
+static weft_err find_wire(aravis_camera *a, weft_error *err)
+{
+    guint n = 0;
+    const char **names = NULL;
+    char list[200] = "";
+    ARAVIS_TRY(a, "asking the trigger's sources",
+               names = arv_camera_dup_available_trigger_sources(a->camera, &n, &error));
+    a->wire_source[0] = '\0';
+    for (guint i = 0; i < n; i++) {
+        const char *const wanted = a->wishes.line;
+        const bool fits = wanted[0] ? strcmp(names[i], wanted) == 0 : strncmp(names[i], "Line", 4) == 0;
+        if (fits && !a->wire_source[0])
+            copy_text(a->wire_source, sizeof a->wire_source, names[i]);
+        const size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%.32s", i ? ", " : "", names[i]);
+    }
+    g_free(names);
+    if (!a->wire_source[0])
+        return weft_fail(err, WEFT_ERR_UNSUPPORTED,
+                         "camera %s: has no trigger input %s (its sources: %s); name one with "
+                         "aravis:%s,line=NAME",
+                         a->address, a->wishes.line[0] ? a->wishes.line : "Line...", list, a->address);
+    return WEFT_OK;
+}
+
+static weft_err set_trigger(aravis_camera *a, weft_camera_trigger wanted, weft_error *err)
+{
+    if (wanted == a->trigger)
+        return WEFT_OK;
+    if (wanted == WEFT_TRIGGER_WIRE)
+        WEFT_TRY(find_wire(a, err));
+    WEFT_TRY(aravis_set_trigger_source(a, wanted == WEFT_TRIGGER_WIRE ? a->wire_source : "Software", err));
+    a->trigger = wanted;
+    return WEFT_OK;
+}
+
+static weft_err set_software_trigger(aravis_camera *a, weft_error *err)
+{
     if (!arv_camera_is_software_trigger_supported(a->camera, NULL))
         return weft_fail(err, WEFT_ERR_UNSUPPORTED, "camera %s: has no software trigger", a->address);
     ARAVIS_TRY(a, "setting continuous acquisition",
                arv_camera_set_acquisition_mode(a->camera, ARV_ACQUISITION_MODE_CONTINUOUS, &error));
     ARAVIS_TRY(a, "setting the software trigger", arv_camera_set_trigger(a->camera, "Software", &error));
-    ARAVIS_TRY(a, "reading back the trigger", source = arv_camera_get_trigger_source(a->camera, &error));
-    if (!source || strcmp(source, "Software") != 0)
-        return weft_fail(err, WEFT_ERR_PROTOCOL, "camera %s: stays at trigger source %s when told Software",
-                         a->address, source ? source : "?");
-    return WEFT_OK;
+    return aravis_set_trigger_source(a, "Software", err);
 }
 
 static weft_err learn_ranges(aravis_camera *a, weft_error *err)
@@ -283,11 +339,16 @@ static weft_err aravis_configure(void *state, const weft_camera_settings *wanted
 {
     aravis_camera *const a = state;
     const double exposure_s = wanted->exposure_s > 0 ? wanted->exposure_s : a->set.exposure_s;
-    weft_camera_settings got;
+    weft_camera_settings got = *wanted;
     if (exposure_s < 0.999 * a->exposure_min_s || exposure_s > 1.001 * a->exposure_max_s)
         return weft_fail(err, WEFT_ERR_RANGE,
                          "camera %s: an exposure of %g s is not possible, only %g to %g s", a->address,
                          exposure_s, a->exposure_min_s, a->exposure_max_s);
+    if (memcmp(&wanted->region, &a->region, sizeof a->region) != 0) {
+        aravis_stop(a); /* the size of its frames changes */
+        WEFT_TRY(set_region(a, &wanted->region, err));
+    }
+    WEFT_TRY(set_trigger(a, wanted->trigger, err));
     WEFT_TRY(set_gain(a, wanted->gain, &got.gain, err));
     WEFT_TRY(aravis_set_exposure(a, exposure_s, &got.exposure_s, err));
     a->set = got;
@@ -301,7 +362,9 @@ static weft_err open_patiently(aravis_camera *a, const char *address, double pat
 {
     ArvDevice *device = NULL;
     GError *error = NULL;
-    copy_text(a->address, sizeof a->address, address);
+    const size_t n = strcspn(address, ",");
+    snprintf(a->address, sizeof a->address, "%.*s", (int)n, address);
+    WEFT_TRY(aravis_read_wishes(address + n, &a->wishes, err));
     a->info = info;
     WEFT_TRY(open_device(a, &device, err));
     a->camera = arv_camera_new_with_device(device, &error);
@@ -321,7 +384,7 @@ static weft_err aravis_open(void *state, const char *address, weft_camera_state 
     WEFT_TRY(open_patiently(a, address, OWNED_PATIENCE_S, info, err));
     arv_camera_stop_acquisition(a->camera, NULL); /* a killed client may have left it streaming */
     WEFT_TRY(set_format(a, err));
-    WEFT_TRY(set_full_region(a, err));
+    WEFT_TRY(set_region(a, &(weft_camera_region){0}, err));
     WEFT_TRY(switch_off_automatics(a, err));
     WEFT_TRY(set_software_trigger(a, err));
     WEFT_TRY(learn_ranges(a, err));

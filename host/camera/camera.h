@@ -72,7 +72,7 @@ typedef struct weft_camera_file {
 
 typedef struct weft_captured_frame {
     weft_frame_status status;
-    char reason[128];      /* in words, when not complete */
+    char reason[192];      /* in words, when not complete */
     weft_mosaic mosaic;    /* owned by the caller; valid only when complete.  Zeroed before the first use;
                               the memory is used again by the next frame of the same size */
     weft_camera_file file; /* what `mosaic` was decoded from, to be kept instead of a DNG; the caller's too */

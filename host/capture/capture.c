@@ -62,6 +62,7 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     run->shooter.level = o->level;
     run->shooter.settle_s = o->settle_s;
     run->shooter.deadline_s = o->deadline_s;
+    run->shooter.trigger = o->trigger;
     return WEFT_OK;
 }
 
@@ -269,9 +270,14 @@ static json_t *describe_shot(const capture_run *run, const weft_planned_frame *f
     json_t *const o =
         json_pack("{s:s, s:I, s:O, s:o}", "taken", now, "sequence", (json_int_t)run->shooter.frame.sequence,
                   "retries", retries, "statistics", weft_frame_stats_to_json(&shot->stats));
-    if (!o || !frame->lights)
+    if (!o || (!frame->lights && !shot->proved))
         return o;
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
+    json_object_set_new(o, "proof", json_string(shot->proved ? "exposure line" : "controller and picture"));
+    if (shot->proved) {
+        json_object_set_new(o, "rise_tick", json_integer((json_int_t)shot->rise_tick));
+        json_object_set_new(o, "fall_tick", json_integer((json_int_t)shot->fall_tick));
+    }
     json_object_set_new(o, "lights", json_integer((json_int_t)frame->lights));
     json_object_set_new(o, "level", json_integer(run->o.level));
     json_object_set_new(o, "settle_s", json_real(run->o.settle_s));

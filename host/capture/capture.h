@@ -37,11 +37,12 @@ typedef struct weft_capture_options {
     bool all;           /* also one frame with all lights on */
     bool dark;          /* also one frame with the lens capped */
     double settle_s;    /* between light on and trigger; 0: 5 ms */
-    double deadline_s;  /* how long after its exposure a frame may come; 0: 6 s */
-    int tries;          /* per frame; 0: 3 */
-    double patience_s;  /* how long a light controller that was unplugged is waited for; 0: 10 s */
-    bool resume;        /* go on with a set that was interrupted */
-    bool force;         /* replace a set that is there */
+    weft_camera_trigger trigger;
+    double deadline_s; /* how long after its exposure a frame may come; 0: 6 s */
+    int tries;         /* per frame; 0: 3 */
+    double patience_s; /* how long a light controller that was unplugged is waited for; 0: 10 s */
+    bool resume;       /* go on with a set that was interrupted */
+    bool force;        /* replace a set that is there */
     /** Called before the dark frame, to have the lens capped; NULL: not called. */
     weft_err (*cap_lens)(void *context, weft_error *err);
     void *context;

@@ -12,7 +12,7 @@
 
 typedef struct capture_args {
     weft_device_options devices;
-    const char *lights, *exposure, *name;
+    const char *lights, *exposure, *name, *trigger;
     double gain, settle_s;
     int bracket, level;
     bool ambient, no_ambient, dark, all_frame, only_all, resume;
@@ -59,6 +59,13 @@ static const weft_field capture_fields[] = {
      .min = 0.0001,
      .max = 10,
      .help = "wait between light on and trigger (default 0.005)"},
+    {.key = "trigger",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(capture_args, trigger),
+     .unit = "HOW",
+     .help =
+         "software, or wire: the light controller's trigger line, with proof by the camera's exposure line "
+         "where that is wired (default software)"},
     {.key = "ambient",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(capture_args, ambient),
@@ -137,6 +144,10 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
         .resume = a->resume,
         .force = inv->force,
     };
+    if (a->trigger && strcmp(a->trigger, "wire") == 0)
+        o->trigger = WEFT_TRIGGER_WIRE;
+    else if (a->trigger && strcmp(a->trigger, "software") != 0)
+        return weft_fail(err, WEFT_ERR_USAGE, "--trigger %s: wanted software or wire", a->trigger);
     if (a->ambient && a->no_ambient)
         return weft_fail(err, WEFT_ERR_USAGE, "--ambient and --no-ambient exclude each other");
     if (a->only_all && (a->lights || a->bracket > 1))

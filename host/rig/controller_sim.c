@@ -80,6 +80,13 @@ void weft_controller_sim_set_camera(weft_controller_sim *sim, uint32_t delay_us,
     pthread_mutex_unlock(&sim->mutex);
 }
 
+void weft_controller_sim_wire_exposure(weft_controller_sim *sim)
+{
+    pthread_mutex_lock(&sim->mutex);
+    sim->exposure_wired = true;
+    pthread_mutex_unlock(&sim->mutex);
+}
+
 void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high)
 {
     pthread_mutex_lock(&sim->mutex);

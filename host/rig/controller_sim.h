@@ -137,6 +137,9 @@ void weft_controller_sim_set_watch(weft_controller_sim *sim,
  *  exposure_us; 0: no camera, the line stays low. */
 void weft_controller_sim_set_camera(weft_controller_sim *sim, uint32_t delay_us, uint32_t exposure_us);
 
+/** From now on the exposure line is high during every weft_controller_sim_expose(). */
+void weft_controller_sim_wire_exposure(weft_controller_sim *sim);
+
 /** The exposure line by hand. */
 void weft_controller_sim_set_exposure_line(weft_controller_sim *sim, bool high);
 

@@ -198,6 +198,8 @@ static avr_cycle_count_t end_exposure(avr_t *avr, avr_cycle_count_t when, void *
     for (int i = 0; i < WEFT_SIM_N_LIGHTS; i++)
         e->on_parts[i] = sim->on_parts[i] - e->on_parts[i];
     e->done = true;
+    if (sim->exposure_wired)
+        weft_sim_set_exposure_line(sim, false);
     pthread_cond_broadcast(&sim->passed);
     return 0;
 }
@@ -209,6 +211,8 @@ void weft_sim_begin_exposure(weft_controller_sim *sim, weft_sim_exposure *e, uin
     e->end = e->begin + (avr_cycle_count_t)exposure_us * WEFT_SIM_CYCLES_A_US;
     memcpy(e->on_parts, sim->on_parts, sizeof e->on_parts);
     sim->exposures = e;
+    if (sim->exposure_wired)
+        weft_sim_set_exposure_line(sim, true);
     avr_cycle_timer_register(sim->avr, e->end - sim->avr->cycle, end_exposure, e);
 }
 

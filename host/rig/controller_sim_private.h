@@ -83,6 +83,7 @@ struct weft_controller_sim {
     void *change_context;
     uint32_t camera_delay_us, camera_exposure_us; /* 0: no camera */
     bool exposing;
+    bool exposure_wired; /* the line follows weft_controller_sim_expose() */
 
     uint32_t ram_free; /* first address behind the variables; 0: unknown */
     bool watch_lock;

@@ -4,9 +4,12 @@
 #include "core/file.h"
 #include "core/mem.h"
 
+#include "core/text.h"
 #include <arpa/inet.h>
+
 #include <arv.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -18,6 +21,9 @@
 #define VERSION_ADDRESS 0x88
 #define TEXT_LENGTH     32
 #define GVCP_PORT       3956
+/* What TriggerSource says in virtual-scanner.xml. */
+#define SOURCE_ADDRESS 0x2304
+#define SOURCE_LINE1   2
 
 extern const weft_embedded weft_rig_data[];
 
@@ -27,7 +33,8 @@ struct weft_rig_camera {
     weft_rig_stage *stage;
     weft_controller_sim *sim;
     int width, height;
-    uint16_t *dn; /* [height][width]: the whole sensor, of which a region is sent */
+    uint16_t *dn;           /* [height][width]: the whole sensor, of which a region is sent */
+    atomic_int blackout_ms; /* of the next frame */
 };
 
 /* Copies the region that the client asked for; 8-bit clients get the upper bits. */
@@ -56,6 +63,7 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
 {
     weft_rig_camera *const camera = context;
     double on[WEFT_RIG_N_LIGHTS] = {0};
+    g_usleep(1000UL * (gulong)atomic_exchange(&camera->blackout_ms, 0));
     if (!weft_controller_sim_expose(camera->sim, exposure_us, on))
         memset(on, 0, sizeof on);
     const double gain = pow(10, gain_raw / 2000.0); /* GainRaw counts 0.01 dB */
@@ -63,10 +71,14 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
     copy_region(camera, buffer, format);
 }
 
-/* From the simulator's thread: the trigger pin is wired to the camera. */
+/* From the simulator's thread: the trigger pin is wired to Line1 of the camera. */
 static void on_trigger(void *context)
 {
     const weft_rig_camera *const camera = context;
+    uint32_t source = 0;
+    arv_fake_camera_read_register(arv_gv_fake_camera_get_fake_camera(camera->gv), SOURCE_ADDRESS, &source);
+    if (source != SOURCE_LINE1)
+        return;
     arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera->gv),
                                    ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
 }
@@ -102,6 +114,8 @@ static void set_registers(const weft_rig_camera *camera, ArvFakeCamera *fake)
         {ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, 0x0110002f}, /* BayerRG16 */
         {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 40000},
         {ARV_FAKE_CAMERA_REGISTER_GAIN_RAW, 0},
+        {ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOURCE, 1}, /* whichever source SOURCE_ADDRESS names */
+        {SOURCE_ADDRESS, 1},
     };
     for (size_t i = 0; i < sizeof registers / sizeof registers[0]; i++)
         arv_fake_camera_write_register(fake, registers[i].address, registers[i].value);
@@ -135,6 +149,30 @@ static weft_err start(weft_rig_camera *camera, const char *address, weft_error *
     arv_fake_camera_set_trigger_frequency(fake, 1000);
     set_registers(camera, fake);
     weft_controller_sim_set_trigger(camera->sim, on_trigger, camera);
+    weft_controller_sim_wire_exposure(camera->sim);
+    return WEFT_OK;
+}
+
+weft_err weft_rig_camera_fail(weft_rig_camera *camera, const char *words, weft_error *err)
+{
+    ArvFakeCamera *const fake = arv_gv_fake_camera_get_fake_camera(camera->gv);
+    const char *const space = strchr(words, ' ');
+    const size_t n = space ? (size_t)(space - words) : strlen(words);
+    double number = -1;
+    const bool has_number = space && weft_text_to_double(space + 1, &number);
+    if (n == 4 && memcmp(words, "lost", n) == 0 && has_number && number >= 0 && number <= 1)
+        g_object_set(camera->gv, "gvsp-lost-ratio", number, NULL);
+    else if (n == 8 && memcmp(words, "blackout", n) == 0 && has_number && number >= 0 && number <= 60)
+        atomic_store(&camera->blackout_ms, (int)(1e3 * number));
+    else if (strcmp(words, "stray") == 0)
+        arv_fake_camera_write_register(fake, ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
+    else if (strcmp(words, "format BayerRG8") == 0)
+        arv_fake_camera_write_register(fake, ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT,
+                                       ARV_PIXEL_FORMAT_BAYER_RG_8);
+    else
+        return weft_fail(
+            err, WEFT_ERR_USAGE,
+            "camera: wanted lost 0..1, blackout 0..60 (seconds), stray or format BayerRG8, not %s", words);
     return WEFT_OK;
 }
 

@@ -191,6 +191,44 @@ static json_t *obey_board(rig *r, const char *words)
     return reply_error(&error);
 }
 
+static json_t *obey_camera(const rig *r, const char *words)
+{
+    weft_error error = {0};
+    if (weft_rig_camera_fail(r->camera, words, &error) != WEFT_OK)
+        return reply_error(&error);
+    return json_pack("{s:b}", "ok", 1);
+}
+
+/* "frame FILE EXPOSURE_S": what a camera at the GigE camera's place sees from now on, under the lamps that
+ * are on: 16 bits a photosite in the order of memory, nothing else, written over the file. */
+static json_t *obey_frame(const rig *r, const char *words)
+{
+    const weft_camera *const camera = &weft_rig_stage_scene(r->stage)->camera;
+    const size_t n = (size_t)camera->width * (size_t)camera->height;
+    const char *const space = strrchr(words, ' ');
+    double exposure_s = 0, on[WEFT_RIG_N_LIGHTS] = {0};
+    char path[PATH_MAX];
+    weft_error error = {0};
+    if (!space || space == words || !weft_text_to_double(space + 1, &exposure_s) ||
+        !(exposure_s >= 1e-5 && exposure_s <= 10))
+        return json_pack("{s:b, s:s}", "ok", 0, "error", "wanted: frame FILE EXPOSURE_S, 0.00001 to 10 s");
+    snprintf(path, sizeof path, "%.*s", (int)(space - words), words);
+    uint16_t *const dn = weft_alloc(n, sizeof *dn, &error);
+    if (!dn)
+        return reply_error(&error);
+    if (!weft_controller_sim_expose(r->sim, (uint32_t)(1e6 * exposure_s), on))
+        memset(on, 0, sizeof on);
+    weft_rig_stage_expose(r->stage, on, exposure_s, 1, dn);
+    FILE *const file = fopen(path, "wb");
+    const bool written = file && fwrite(dn, sizeof *dn, n, file) == n;
+    if (!file || fclose(file) != 0 || !written)
+        weft_fail_errno(&error, WEFT_ERR_IO, "%s: cannot be written", path);
+    weft_free(dn);
+    if (error.code != WEFT_OK)
+        return reply_error(&error);
+    return json_pack("{s:b, s:i, s:i}", "ok", 1, "width", camera->width, "height", camera->height);
+}
+
 static json_t *obey(void *context, const char *line, bool *quit)
 {
     rig *const r = context;
@@ -199,8 +237,8 @@ static json_t *obey(void *context, const char *line, bool *quit)
     const struct {
         const char *name;
         bool wants_more;
-    } commands[] = {{"sample", true}, {"truth", true}, {"samples", false}, {"state", false},
-                    {"reset", false}, {"quit", false}, {"dslr", true},     {"board", true}};
+    } commands[] = {{"sample", true}, {"truth", true}, {"samples", false}, {"state", false}, {"reset", false},
+                    {"quit", false},  {"dslr", true},  {"board", true},    {"camera", true}, {"frame", true}};
     int which = -1;
     for (int i = 0; i < (int)(sizeof commands / sizeof commands[0]); i++)
         if (strlen(commands[i].name) == word && strncmp(line, commands[i].name, word) == 0)
@@ -208,7 +246,7 @@ static json_t *obey(void *context, const char *line, bool *quit)
     if (which < 0 || commands[which].wants_more != (rest[0] != '\0'))
         return json_pack("{s:b, s:s}", "ok", 0, "error",
                          "wanted: sample NAME, samples, state, truth DIR [MM_PER_PX], dslr WORDS, board "
-                         "WORDS, reset or quit");
+                         "WORDS, camera FAULT, frame FILE EXPOSURE_S, reset or quit");
     switch (which) {
     case 0:
         return obey_sample(r, rest);
@@ -225,6 +263,10 @@ static json_t *obey(void *context, const char *line, bool *quit)
         return weft_dslr_obey(r->dslr, rest);
     case 7:
         return obey_board(r, rest);
+    case 8:
+        return obey_camera(r, rest);
+    case 9:
+        return obey_frame(r, rest);
     default:
         *quit = true;
         return json_pack("{s:b}", "ok", 1);

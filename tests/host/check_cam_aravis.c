@@ -2,7 +2,7 @@
 #include "tests/support/support.h"
 
 #include "core/progress.h"
-#include "host/camera/aravis_formats.h"
+#include "host/camera/aravis_private.h"
 #include "host/camera/camera.h"
 #include "tests/host/fake_camera.h"
 
@@ -95,6 +95,151 @@ static void test_frames_are_exact(void **state)
     check_format("BayerRG16", 16, WEFT_CFA_RGGB, 20);
     check_format("BayerGB12p", 12, WEFT_CFA_GBRG, 3);
     check_format("BayerBG8", 8, WEFT_CFA_BGGR, 3);
+    check_format("BayerRG14p", 14, WEFT_CFA_RGGB, 3);
+    check_format("BayerGR10p", 10, WEFT_CFA_GRBG, 3);
+}
+
+static void test_a_region_of_the_sensor(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "640x482");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    const weft_camera_state *const info = weft_camera_get_state(camera);
+    expose_whole(camera, &frame);
+    const weft_camera_settings part = {.exposure_s = 0.001, .region = {16, 20, 128, 64}};
+    for (int i = 0; i < 2; i++) {
+        assert_ok(weft_camera_configure(camera, &part, err));
+        assert_true(info->width == 128 && info->height == 64);
+        expose_whole(camera, &frame);
+        assert_true(frame.mosaic.width == 128 && frame.mosaic.height == 64);
+        assert_int_equal(count_wrong(&frame, 16), 0);
+    }
+    const weft_camera_region wrong[] = {
+        {1, 0, 64, 64}, {0, 0, 63, 64}, {600, 0, 64, 64}, {0, -2, 64, 64}, {0, 0, 64, 1000}};
+    for (int i = 0; i < 5; i++) {
+        const weft_camera_settings bad = {.exposure_s = 0.001, .region = wrong[i]};
+        assert_fails(weft_camera_configure(camera, &bad, err), WEFT_ERR_RANGE,
+                     "even numbers inside 640 x 482");
+    }
+    assert_ok(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 0.001}, err));
+    expose_whole(camera, &frame);
+    assert_true(frame.mosaic.width == 640 && frame.mosaic.height == 482);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_what_the_address_may_ask_for(void **state)
+{
+    (void)state;
+    aravis_wishes w;
+    assert_ok(aravis_read_wishes("", &w, err));
+    assert_true(w.packet_bytes == 0 && w.resend == -1 && !w.line[0]);
+    assert_ok(aravis_read_wishes(",packet=1400,resend=off,line=Line0", &w, err));
+    assert_true(w.packet_bytes == 1400 && w.resend == 0 && strcmp(w.line, "Line0") == 0);
+    assert_fails(aravis_read_wishes(",packet=100", &w, err), WEFT_ERR_USAGE,
+                 "packet=100: wanted 220 to 65535");
+    assert_fails(aravis_read_wishes(",packet=", &w, err), WEFT_ERR_USAGE, "220 to");
+    assert_fails(aravis_read_wishes(",resend=maybe", &w, err), WEFT_ERR_USAGE, "on or off");
+    assert_fails(aravis_read_wishes(",line=", &w, err), WEFT_ERR_USAGE, "name of an input");
+    assert_fails(aravis_read_wishes(",speed=9", &w, err), WEFT_ERR_USAGE, "\"speed\"");
+    assert_fails(aravis_read_wishes(",", &w, err), WEFT_ERR_USAGE, "packet=BYTES");
+
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "320x240");
+    assert_ok(weft_camera_open("aravis:127.0.0.1,packet=1400,resend=on", &camera, err));
+    for (int i = 0; i < 3; i++) {
+        expose_whole(camera, &frame);
+        assert_int_equal(count_wrong(&frame, 16), 0);
+    }
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+    assert_fails(weft_camera_open("aravis:127.0.0.1,packet=7", &camera, err), WEFT_ERR_USAGE, "packet=7");
+}
+
+static void test_every_status_has_its_remedy(void **state)
+{
+    (void)state;
+    const char *words[9];
+    for (int i = 0; i < 9; i++) {
+        words[i] = aravis_status_words((ArvBufferStatus)(i - 1)); /* from UNKNOWN to ABORTED */
+        assert_int_equal(words[i][0] == '\0', i == 1);
+        assert_true(i == 1 || strchr(words[i], ';') != NULL);
+        for (int k = 0; k < i; k++)
+            assert_string_not_equal(words[i], words[k]);
+    }
+}
+
+static void test_a_frame_that_nobody_asked_for_is_noticed(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    for (int i = 0; i < 150; i++) /* over the end of the 16-bit count, 65535, which comes soon */
+        expose_whole(camera, &frame);
+    fake_camera_tell(&fake, "stray");
+    g_usleep(50000);
+    assert_ok(weft_camera_expose(camera, DEADLINE_S, &frame, err));
+    assert_int_equal(frame.status, WEFT_FRAME_INCOMPLETE);
+    assert_non_null(strstr(frame.reason, "counts 1 frames that nobody asked for"));
+    expose_whole(camera, &frame);
+    assert_int_equal(count_wrong(&frame, 16), 0);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_another_format_than_agreed_is_refused(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    expose_whole(camera, &frame);
+    fake_camera_tell(&fake, "format 0108000b");
+    assert_ok(weft_camera_expose(camera, DEADLINE_S, &frame, err));
+    assert_int_equal(frame.status, WEFT_FRAME_INCOMPLETE);
+    assert_non_null(strstr(frame.reason, "of format 0x0108000b, not 64 x 64 BayerRG16"));
+    weft_camera_close(camera);
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err)); /* which sets everything */
+    expose_whole(camera, &frame);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static weft_err count_pulses(void *context, weft_error *err)
+{
+    (void)err;
+    ++*(int *)context;
+    return WEFT_OK;
+}
+
+/* The stock camera has an input line that nothing can pulse: the frame that comes is the rig's test. */
+static void test_a_pulse_that_never_comes(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    int pulses = 0;
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    weft_camera_set_fire(camera, count_pulses, &pulses);
+    const weft_camera_settings wire = {.exposure_s = 0.001, .trigger = WEFT_TRIGGER_WIRE};
+    assert_ok(weft_camera_configure(camera, &wire, err));
+    assert_ok(weft_camera_expose(camera, 0.3, &frame, err));
+    assert_int_equal(frame.status, WEFT_FRAME_TIMEOUT);
+    assert_int_equal(pulses, 1);
+    assert_ok(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 0.001}, err));
+    expose_whole(camera, &frame);
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+    assert_ok(weft_camera_open("aravis:127.0.0.1,line=Line7", &camera, err));
+    assert_fails(weft_camera_configure(camera, &wire, err), WEFT_ERR_UNSUPPORTED, "no trigger input Line7");
+    weft_camera_close(camera);
 }
 
 static void test_settings_out_of_range(void **state)
@@ -238,6 +383,12 @@ int main(void)
         cmocka_unit_test(test_ids),
         cmocka_unit_test_teardown(test_frames_are_exact, end_fake),
         cmocka_unit_test_teardown(test_settings_out_of_range, end_fake),
+        cmocka_unit_test_teardown(test_a_region_of_the_sensor, end_fake),
+        cmocka_unit_test_teardown(test_what_the_address_may_ask_for, end_fake),
+        cmocka_unit_test(test_every_status_has_its_remedy),
+        cmocka_unit_test_teardown(test_a_frame_that_nobody_asked_for_is_noticed, end_fake),
+        cmocka_unit_test_teardown(test_another_format_than_agreed_is_refused, end_fake),
+        cmocka_unit_test_teardown(test_a_pulse_that_never_comes, end_fake),
         cmocka_unit_test_teardown(test_no_raw_format, end_fake),
         cmocka_unit_test_teardown(test_lost_packets_make_a_frame_incomplete, end_fake),
         cmocka_unit_test_teardown(test_a_late_frame_is_not_taken_for_the_next, end_fake),

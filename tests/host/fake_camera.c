@@ -5,6 +5,8 @@
  *     fake_camera FORMAT WIDTHxHEIGHT     prints "ready", then obeys lines on stdin:
  *     lost RATIO      drops that share of the stream's packets
  *     delay MS        holds each frame back for so long, as a long exposure does
+ *     stray           sends a frame that nobody asked for
+ *     format CODE     sends another pixel format (hexadecimal PFNC code) than it was told
  *     quit
  *
  * Exit status 3 when port 3956 is taken.  The picture is fake_camera_sample() of fake_camera.h.
@@ -21,9 +23,22 @@
 static const struct {
     const char *name;
     unsigned code;
-} formats[] = {{"BayerRG16", 0x0110002f}, {"BayerGB12p", 0x010c0055}, {"BayerBG8", 0x0108000b}};
+} formats[] = {{"BayerRG16", 0x0110002f},
+               {"BayerGB12p", 0x010c0055},
+               {"BayerBG8", 0x0108000b},
+               {"BayerRG14p", 0x010e0106},
+               {"BayerGR10p", 0x010a0056}};
 
 static atomic_int delay_ms;
+
+/* Sample i of `bits` bits behind the ones before it, low bits first (PFNC "p"). */
+static void put_bits(uint8_t *bytes, int i, int bits, unsigned sample)
+{
+    for (int b = 0; b < bits; b++) {
+        const int at = i * bits + b;
+        bytes[at / 8] = (uint8_t)((bytes[at / 8] & ~(1u << at % 8)) | (sample >> b & 1) << at % 8);
+    }
+}
 
 static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 gain, ArvPixelFormat format)
 {
@@ -38,6 +53,8 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
         if (format == formats[0].code) {
             bytes[2 * i] = (uint8_t)s;
             bytes[2 * i + 1] = (uint8_t)(s >> 8);
+        } else if (format == formats[3].code || format == formats[4].code) {
+            put_bits(bytes, i, format == formats[3].code ? 14 : 10, s);
         } else if (format == formats[1].code && i % 2 == 0) {
             b[0] = (uint8_t)s;
             b[1] = s >> 8 & 15;
@@ -85,11 +102,18 @@ static void obey(ArvGvFakeCamera *camera)
     char line[80];
     double ratio;
     int ms;
+    unsigned format;
     while (fgets(line, sizeof line, stdin) && strcmp(line, "quit\n") != 0) {
         if (sscanf(line, "lost %lf", &ratio) == 1)
             g_object_set(camera, "gvsp-lost-ratio", ratio, NULL);
         else if (sscanf(line, "delay %d", &ms) == 1)
             atomic_store(&delay_ms, ms);
+        else if (strcmp(line, "stray\n") == 0)
+            arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera),
+                                           ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
+        else if (sscanf(line, "format %x", &format) == 1)
+            arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera),
+                                           ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, format);
         puts("ok");
         fflush(stdout);
     }
