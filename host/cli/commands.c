@@ -21,6 +21,10 @@ extern const weft_command weft_cmd_light_on;
 extern const weft_command weft_cmd_light_run;
 extern const weft_command weft_cmd_light_set;
 extern const weft_command weft_cmd_light_status;
+extern const weft_command weft_cmd_library_find;
+extern const weft_command weft_cmd_library_list;
+extern const weft_command weft_cmd_library_reindex;
+extern const weft_command weft_cmd_library_show;
 extern const weft_command weft_cmd_live;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
@@ -53,6 +57,10 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_preview,
     &weft_cmd_contact,
     &weft_cmd_brdf,
+    &weft_cmd_library_list,
+    &weft_cmd_library_show,
+    &weft_cmd_library_find,
+    &weft_cmd_library_reindex,
     &weft_cmd_completion,
     NULL,
 };

@@ -8,6 +8,7 @@
 #include "host/daemon/http_server.h"
 #include "host/daemon/listen.h"
 #include "host/daemon/token.h"
+#include "host/library/catalogue.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -80,6 +81,17 @@ static weft_err next_epoch(daemon_state *d, int64_t *epoch, weft_error *err)
         d->db, "INSERT INTO meta VALUES ('epoch', 1) ON CONFLICT (key) DO UPDATE SET value = value + 1",
         err));
     return weft_library_db_number(d->db, epoch, err, "SELECT value FROM meta WHERE key = 'epoch'");
+}
+
+/* What came, changed or went while no daemon ran; what has not changed is only looked for. */
+static weft_err look_through_library(daemon_state *d, weft_error *err)
+{
+    weft_progress progress = {0};
+    weft_catalogue_report report;
+    WEFT_TRY(weft_catalogue_reindex(d->db, false, &progress, &report, err));
+    weft_note("%d items in the library, %d new or changed, %d gone", report.n_items, report.n_read,
+              report.n_removed);
+    return WEFT_OK;
 }
 
 static weft_err load_secrets(daemon_state *d, weft_error *err)
@@ -186,6 +198,7 @@ static weft_err set_up(daemon_state *d, weft_error *err)
     WEFT_TRY(weft_library_db_open(d->options->library, &d->db, err));
     WEFT_TRY(take_lock(d, err));
     WEFT_TRY(next_epoch(d, &epoch, err));
+    WEFT_TRY(look_through_library(d, err));
     WEFT_TRY(load_secrets(d, err));
     WEFT_TRY(weft_loop_create(&d->loop, err));
     WEFT_TRY(take_signals(d, err));

@@ -49,7 +49,7 @@ typedef struct weft_http_request {
     weft_http_connection *connection;
     struct MHD_Connection *mhd;
     const struct weft_route *route; /* NULL: answered already */
-    char *path;                     /* decoded */
+    char *url, *path;               /* as it came; decoded */
     const char *tail;               /* what {id} or {path} of the route stands for, in path */
     int64_t id;                     /* of {id} */
     char *body;
@@ -122,6 +122,6 @@ weft_route_fn weft_route_info, weft_route_openapi, weft_route_commands;
 weft_route_fn weft_route_jobs_list, weft_route_jobs_add, weft_route_job_get, weft_route_job_remove,
     weft_route_job_log, weft_route_job_cancel, weft_route_job_resume;
 weft_route_fn weft_route_events, weft_route_live, weft_route_live_picture, weft_route_live_stream;
-weft_route_fn weft_route_library_list, weft_route_library_item, weft_route_library_reindex, weft_route_file;
+weft_route_fn weft_route_library_list, weft_route_library_item, weft_route_file;
 
 #endif

@@ -192,23 +192,18 @@ static enum MHD_Result refuse_size(weft_http_request *r)
     return weft_reply_problem(r, 413, "body_too_large", "a body has at most %d bytes", WEFT_JOB_REQUEST_MAX);
 }
 
-static bool check_body_headers(weft_http_request *r, enum MHD_Result *result)
+static bool check_body(weft_http_request *r, enum MHD_Result *result)
 {
     static const char json[] = "application/json";
-    const char *const type = header_of(r, "Content-Type"), *const length = header_of(r, "Content-Length");
-    const long n = length ? strlen(length) > 9 ? LONG_MAX : strtol(length, NULL, 10) : 0;
-    if (n >
-        SWALLOWED) { /* hung up on; a smaller one is heard to its end, so that its client hears the answer */
+    const char *const type = header_of(r, "Content-Type");
+    if (r->too_large)
         *result = refuse_size(r);
-        return false;
-    }
-    r->too_large = n > WEFT_JOB_REQUEST_MAX;
-    if (r->route->body && (!type || strncasecmp(type, json, strlen(json)) != 0 ||
-                           (type[strlen(json)] && !strchr("; ", type[strlen(json)])))) {
+    else if (r->route->body && (!type || strncasecmp(type, json, strlen(json)) != 0 ||
+                                (type[strlen(json)] && !strchr("; ", type[strlen(json)]))))
         *result = weft_reply_problem(r, 415, "not_json", "Content-Type: %s is wanted", json);
-        return false;
-    }
-    return true;
+    else
+        return true;
+    return false;
 }
 
 static enum MHD_Result refuse_method(weft_http_request *r, const char *allowed)
@@ -221,13 +216,14 @@ static enum MHD_Result refuse_method(weft_http_request *r, const char *allowed)
     return weft_reply(r, 405, response, "application/json");
 }
 
-static enum MHD_Result begin_request(weft_http_request *r, const char *url, const char *method)
+/* The whole request is here. */
+static enum MHD_Result judge(weft_http_request *r, const char *method)
 {
     enum MHD_Result result = MHD_NO;
     char allowed[64];
     if (!check_client(r, &result))
         return result;
-    r->path = weft_http_decode(url, false);
+    r->path = weft_http_decode(r->url, false);
     if (!r->path)
         return weft_reply_problem(r, 400, "bad_path", "the path is not UTF-8, or holds control characters");
     r->route = weft_route_find(method, r->path, &r->tail, &r->id, allowed);
@@ -236,7 +232,20 @@ static enum MHD_Result begin_request(weft_http_request *r, const char *url, cons
     if (!r->route)
         return weft_reply_problem(r, 404, "no_such_path",
                                   "there is no %.200s; GET /v1/openapi.json lists what is", r->path);
-    return check_body_headers(r, &result) ? MHD_YES : result;
+    return check_body(r, &result) ? r->route->answer(r) : result;
+}
+
+/* The headers are here.  Nothing is refused before the body has come too, so that a client that is still
+ * sending hears why; but a body that would take long is not waited for. */
+static enum MHD_Result begin_request(weft_http_request *r, const char *url)
+{
+    const char *const length = header_of(r, "Content-Length");
+    const long n = length ? strlen(length) > 9 ? LONG_MAX : strtol(length, NULL, 10) : 0;
+    r->url = weft_strdup(url, NULL);
+    if (!r->url)
+        return MHD_NO;
+    r->too_large = n > WEFT_JOB_REQUEST_MAX;
+    return n > SWALLOWED ? refuse_size(r) : MHD_YES;
 }
 
 static enum MHD_Result take_body(weft_http_request *r, const char *bytes, size_t n)
@@ -275,7 +284,7 @@ enum MHD_Result weft_http_handle(void *context, struct MHD_Connection *mhd, cons
         *con_cls = r;
         if (!r->connection)
             return MHD_NO;
-        return begin_request(r, url, method);
+        return begin_request(r, url);
     }
     if (*n_upload > 0) {
         const size_t n = *n_upload;
@@ -285,9 +294,7 @@ enum MHD_Result weft_http_handle(void *context, struct MHD_Connection *mhd, cons
     if (r->answered)
         return MHD_YES;
     r->connection->waiting_s = 0;
-    if (r->too_large)
-        return refuse_size(r);
-    return r->route->answer(r);
+    return judge(r, method);
 }
 
 void weft_http_completed(void *context, struct MHD_Connection *mhd, void **con_cls,
@@ -299,6 +306,7 @@ void weft_http_completed(void *context, struct MHD_Connection *mhd, void **con_c
         return;
     if (r->connection)
         r->connection->waiting_s = weft_clock_s(); /* the next request of this connection */
+    weft_free(r->url);
     weft_free(r->path);
     weft_free(r->body);
     weft_free(r);

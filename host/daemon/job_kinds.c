@@ -18,13 +18,14 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "calibrate lens", .reads = "*|board-on-table", .writes = "output"},
     {.command = "calibrate linearity", CHART},
     {.command = "calibrate white", CHART},
-    {.command = "calibrate lights", .reads = "*|guess", .writes = "output"},
+    {.command = "calibrate lights", .reads = "*|guess|positions", .writes = "output"},
     {.command = "calibrate colour", CHART, .texts = "chart|edition|exclude"},
     {.command = "import", .reads = "*", .writes = "output|cal"},
     {.command = "solve", .reads = "*|calibration", .writes = "output", .texts = "method"},
     {.command = "compare", .reads = "*|mask"},
     {.command = "preview", .reads = "*", .writes = "output", .texts = "brdf|param"},
     {.command = "contact", .reads = "*", .writes = "output", .texts = "brdf|param"},
+    {.command = "library reindex", .reads = "library"},
     {0},
 };
 /* clang-format on */

@@ -129,6 +129,12 @@ static bool list_to_text(const json_t *list, char text[MAX_TEXT + 2])
     return used > 0;
 }
 
+static bool is_classified(const weft_job_kind *kind, const char *key)
+{
+    return weft_job_kind_lists(kind->reads, key) || weft_job_kind_lists(kind->writes, key) ||
+           weft_job_kind_lists(kind->texts, key) || weft_job_kind_is_device(key);
+}
+
 static weft_err take_option(parse *p, const char *key, const json_t *value, weft_error *err)
 {
     char text[MAX_TEXT + 2];
@@ -139,6 +145,8 @@ static weft_err take_option(parse *p, const char *key, const json_t *value, weft
     if (weft_job_kind_is_device(key) && !p->rights->own_user)
         return weft_fail(err, WEFT_ERR_RANGE, "\"%s\": the devices are the daemon's; leave the option out",
                          key);
+    if ((field->type == WEFT_FIELD_TEXT || field->type == WEFT_FIELD_TEXTS) && !is_classified(p->kind, key))
+        return weft_fail(err, WEFT_ERR_USAGE, "\"%s\" cannot be given to a job", key); /* it may be a path */
     if (field->type == WEFT_FIELD_FLAG) {
         if (!json_is_boolean(value))
             return weft_fail(err, WEFT_ERR_USAGE, "\"%s\": wanted true or false", key);
@@ -170,13 +178,15 @@ static weft_err take_options(parse *p, const json_t *request, weft_error *err)
     return WEFT_OK;
 }
 
-/* The devices that the daemon was started for, where the request names none. */
+/* The library and the devices that the daemon was started for, where the request names none. */
 static weft_err add_devices(parse *p, const json_t *request, weft_error *err)
 {
     const struct {
         const char *key, *value;
     } devices[] = {{"rig", p->rights->rig}, {"port", p->rights->port}, {"camera", p->rights->camera}};
     const json_t *const options = json_object_get(request, "options");
+    if (find_field(p->command, "library") && !json_object_get(options, "library"))
+        return add_option(p, "library", p->rights->root, err);
     for (int i = 0; i < 3; i++)
         if (json_object_get(options, devices[i].key))
             return WEFT_OK;

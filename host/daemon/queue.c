@@ -8,6 +8,7 @@
 #include "host/daemon/child.h"
 #include "host/daemon/job_kinds.h"
 #include "host/daemon/job_words.h"
+#include "host/library/catalogue.h"
 
 #include <inttypes.h>
 #include <signal.h>
@@ -26,7 +27,7 @@ enum {
     KEEP_JOBS = 2000
 };
 #define GRACE_S 10.0 /* between the request to end and SIGKILL */
-#define HOLD_S  5.0 /* for the one who wants to hold a job to come */
+#define HOLD_S  5.0  /* for the one who wants to hold a job to come */
 
 typedef struct running_job {
     weft_queue *queue; /* NULL: free */
@@ -208,6 +209,21 @@ static void on_report(void *context, json_t *message, int picture)
         close(picture);
 }
 
+/* Enters what the job has made. */
+static void catalogue_works(running_job *r)
+{
+    for (size_t i = 0; i < json_array_size(r->job.writes); i++) {
+        weft_error error = {0};
+        bool known;
+        const char *const path = json_string_value(json_array_get(r->job.writes, i));
+        if (weft_catalogue_index(r->queue->db, path, &known, &error) != WEFT_OK)
+            weft_warn("%s: cannot be catalogued: %s", path, error.text);
+        else if (known)
+            weft_events_add(r->queue->events, "library", r->job.id,
+                            json_pack("{s:s, s:I}", "path", path, "job", (json_int_t)r->job.id));
+    }
+}
+
 /* Stores the end that is written in the slot; the slot stays when the database does not take it. */
 static void store_end(running_job *r)
 {
@@ -260,6 +276,7 @@ static void on_end(void *context, int status)
         weft_job_sweep(&r->job, r->pid);
     weft_child_destroy(r->child);
     r->child = NULL;
+    catalogue_works(r);
     store_end(r);
 }
 

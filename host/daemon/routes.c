@@ -23,6 +23,9 @@ const weft_route weft_routes[] = {
     {"GET",    "/v1/live",             "getLive",        weft_route_live,            false},
     {"GET",    "/v1/live.jpg",         "getLivePicture", weft_route_live_picture,    false},
     {"GET",    "/v1/live.mjpg",        "watchLive",      weft_route_live_stream,     false},
+    {"GET",    "/v1/library",          "listLibrary",    weft_route_library_list,    false},
+    {"GET",    "/v1/library/{path}",   "getItem",        weft_route_library_item,    false},
+    {"GET",    "/v1/files/{path}",     "getFile",        weft_route_file,            false},
     {0},
 };
 /* clang-format on */

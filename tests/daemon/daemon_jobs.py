@@ -56,7 +56,7 @@ def test_events_of_a_job():
 
 def begin_long_solve(d):
     """A solve that takes a second or more."""
-    make_flat(f"{d.library}/flat", 4000, 3000)
+    make_flat(f"{d.library}/flat", 2000, 1600)
     assert d.run("import", "flat", output="flat.set")["state"] == "done"
     return d.add("solve", "flat.set", calibration="flat.cal", output="flat.maps")
 

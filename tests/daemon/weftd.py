@@ -1,4 +1,5 @@
 """A daemon under test: its process, requests over its socket, its events.  Used by the tests beside it."""
+import concurrent.futures
 import fcntl
 import hashlib
 import http.client
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 import zlib
 
 BIN = os.environ["WEFT_TEST_BIN"]
@@ -169,7 +171,7 @@ def scratch():
     return folder
 
 
-def make_flat(folder, width=32, height=24):
+def make_flat(folder, width=32, height=24, noise=False):
     """A flat matte plate under five lights as 16-bit PNGs with a light-position file: what `weft import` reads."""
     lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0, -0.6, 0.8)]
 
@@ -181,6 +183,8 @@ def make_flat(folder, width=32, height=24):
         print(len(lights), file=lp)
         for i, (x, y, z) in enumerate(lights):
             rows = (b"\0" + struct.pack(">H", round(65535 * 0.5 * z)) * width) * height
+            if noise:
+                rows = b"".join(b"\0" + bytes(v | 32 for v in os.urandom(2 * width)) for _ in range(height))
             with open(f"{folder}/p{i}.png", "wb") as png:
                 png.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0))
                           + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
@@ -212,24 +216,25 @@ def alive(pid):
         return False
 
 
-def run_tests(namespace):
-    """Runs every function test_* of a module; prints one line each."""
-    wanted = sys.argv[1:]
-    failed = 0
-    for name, test in list(namespace.items()):
-        if not name.startswith("test_") or (wanted and name not in wanted):
-            continue
-        begin = time.monotonic()
-        try:
-            test()
-            print(f"ok    {name} ({time.monotonic() - begin:.1f} s)")
-        except Exception:  # every test is run
-            import traceback
-            traceback.print_exc()
-            print(f"FAIL  {name}")
-            failed += 1
-        sys.stdout.flush()
-    sys.exit(failed > 0)
+def run_one(name, test):
+    begin = time.monotonic()
+    try:
+        test()
+        print(f"ok    {name} ({time.monotonic() - begin:.1f} s)", flush=True)
+        return True
+    except Exception:  # every test is run
+        print(f"{traceback.format_exc()}FAIL  {name}", flush=True)
+        return False
+
+
+def run_tests(namespace, at_a_time=1):
+    """Runs every function test_* of a module, or those named on the command line, each with a daemon of its own;
+    several at a time, because many of them wait."""
+    tests = [(name, test) for name, test in namespace.items()
+             if name.startswith("test_") and (not sys.argv[1:] or name in sys.argv[1:])]
+    with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
+        good = list(pool.map(lambda test: run_one(*test), tests))
+    sys.exit(not all(good))
 
 
 class Rig:
