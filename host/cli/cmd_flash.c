@@ -31,7 +31,7 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_INT,
      .offset = offsetof(flash_args, baud),
      .min = 0,
-     .max = 1000000,
+     .max = 921600,
      .help = "rate of the bootloader (0: 115200, then 57600)"},
     {0},
 };

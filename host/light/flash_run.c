@@ -49,6 +49,7 @@ static void become_avrdude(const avrdude *a, const char *program, int out, int r
     dup2(out, STDOUT_FILENO);
     dup2(out, STDERR_FILENO);
     fcntl(reservation, F_SETFD, 0); /* when we are killed the port stays taken until it has ended */
+    (void)signal(SIGPIPE, SIG_IGN); /* and it does end what it has begun, with nobody to tell */
     execv(program, (char *const *)(void *)words);
     _exit(127);
 }

@@ -33,6 +33,12 @@ weft_err weft_port_fail_used(const char *port, const weft_port_user *user, weft_
     return weft_fail(err, WEFT_ERR_DEVICE, "%s: another program is using this port; close it first", port);
 }
 
+/* Device files that may be serial ports; /dev/null and its like (major 1) are open everywhere. */
+static bool is_port(const char *path, struct stat *device)
+{
+    return stat(path, device) == 0 && S_ISCHR(device->st_mode) && major(device->st_rdev) != 1;
+}
+
 /* -- reservation ---------------------------------------------------------------------------------------- */
 
 /* Whoever listens at the name answers for it, also to other users. */
@@ -57,7 +63,7 @@ weft_err weft_port_reserve(const char *port, int *fd, weft_error *err)
     struct stat device;
     struct sockaddr_un name = {.sun_family = AF_UNIX};
     *fd = -1;
-    if (stat(port, &device) != 0 || !S_ISCHR(device.st_mode))
+    if (!is_port(port, &device))
         return WEFT_OK;
     const int length = snprintf(name.sun_path + 1, sizeof name.sun_path - 1, "weft-port-%u:%u",
                                 major(device.st_rdev), minor(device.st_rdev));
@@ -100,7 +106,7 @@ bool weft_port_find_user(const char *port, weft_port_user *user)
     struct stat device;
     DIR *const processes = opendir("/proc");
     *user = (weft_port_user){0};
-    if (processes && stat(port, &device) == 0 && S_ISCHR(device.st_mode))
+    if (processes && is_port(port, &device))
         for (const struct dirent *entry; user->pid == 0 && (entry = readdir(processes)) != NULL;) {
             const int pid =
                 isdigit((unsigned char)entry->d_name[0]) ? (int)strtol(entry->d_name, NULL, 10) : 0;

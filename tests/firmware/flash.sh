@@ -18,7 +18,11 @@ also 'settings  kept: serial WL-00042, 10 lights, at most 2000 ms'
 also 'verified'
 expect 0 'trim-7 200' "$weft" light set trim-7 --port "$pty"
 
-# Killed while avrdude goes on: the port stays taken until that has ended, and the board is whole.
+# Killed while avrdude goes on: the port stays taken until that has ended, and the board is whole.  Over other
+# contents, or it would be whole by luck.
+head -c 12000 /dev/zero >zeros.bin
+avr-objcopy -I binary -O ihex zeros.bin zeros.hex
+avrdude -qq -p m328p -c arduino -P "$pty" -b 115200 -D -V -U flash:w:zeros.hex:i >out 2>&1 || die "$(cat out)"
 flash_until_writing
 kill -KILL $flasher
 wait $flasher 2>/dev/null

@@ -31,6 +31,10 @@ expect 1 'does not hold what was written' "$weft" flash --port "$pty"
 board busy "$WEFT_TEST_BUILD/firmware/weft-firmware.elf" "$optiboot"
 sleep 60 7<>"$pty" &
 sleeper=$!
+for _ in $(seq 100); do
+    [ "$(cat /proc/$sleeper/comm 2>/dev/null)" = sleep ] && break # and has the port open
+    sleep 0.05
+done
 expect 1 "another program is using this port: sleep (process $sleeper)" "$weft" flash --port "$pty"
 kill $sleeper
 wait $sleeper 2>/dev/null
@@ -55,6 +59,8 @@ expect 1 'where the bootloader is' "$weft" flash --port "$pty" --image "$optiboo
 cp "$image" 'a:b.hex'
 expect 2 'colon' "$weft" flash --port "$pty" --image a:b.hex
 expect 1 'there is no such port' "$weft" flash --port /dev/ttyNOT
+expect 1 'this is not a serial port' "$weft" flash --port /dev/null
+expect 1 'this is not a serial port' "$weft" flash --port "$image"
 expect 2 'no such option' "$weft" flash --prot x
 expect 1 'no virtual scanner runs there' "$weft" flash --rig "$work"
 
