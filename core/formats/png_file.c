@@ -21,6 +21,7 @@ typedef struct png_job {
     png_infop info;
     png_bytep *rows;
     weft_raster raster;
+    const weft_raster_note *note; /* to be written; NULL: none */
     weft_error *err;
     weft_err status; /* set before the longjmp */
     bool writing;
@@ -179,6 +180,25 @@ static void fill_line(uint8_t *line, const uint16_t *row, size_t n, int bits)
     }
 }
 
+static void set_note(png_job *job, const weft_raster_note *n)
+{
+    png_text texts[2] = {{.compression = PNG_TEXT_COMPRESSION_NONE},
+                         {.compression = PNG_TEXT_COMPRESSION_NONE}};
+    int count = 0;
+    if (n->icc)
+        png_set_iCCP(job->png, job->info, "ICC profile", PNG_COMPRESSION_TYPE_BASE, n->icc,
+                     (png_uint_32)n->icc_size);
+    if (n->description) {
+        texts[count].key = (png_charp) "Description";
+        texts[count++].text = (png_charp)n->description;
+    }
+    if (n->software) {
+        texts[count].key = (png_charp) "Software";
+        texts[count++].text = (png_charp)n->software;
+    }
+    png_set_text(job->png, job->info, texts, count);
+}
+
 static void write_with_libpng(png_job *job, const weft_raster *raster, uint8_t *line)
 {
     static const int colour_types[5] = {0, PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
@@ -191,6 +211,8 @@ static void write_with_libpng(png_job *job, const weft_raster *raster, uint8_t *
     png_set_IHDR(job->png, job->info, (png_uint_32)raster->width, (png_uint_32)raster->height, raster->bits,
                  colour_types[raster->channels], PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
+    if (job->note)
+        set_note(job, job->note);
     png_write_info(job->png, job->info);
     const size_t n = (size_t)raster->width * (size_t)raster->channels;
     for (int y = 0; y < raster->height; y++) {
@@ -220,9 +242,15 @@ static weft_err write_stream(png_job *job, const weft_raster *raster)
 
 weft_err weft_png_write(const char *path, const weft_raster *raster, weft_error *err)
 {
+    return weft_png_write_noted(path, raster, NULL, err);
+}
+
+weft_err weft_png_write_noted(const char *path, const weft_raster *raster, const weft_raster_note *note,
+                              weft_error *err)
+{
     weft_atomic a;
     WEFT_TRY(weft_atomic_file_begin(&a, path, err));
-    png_job job = {.path = path, .err = err, .writing = true};
+    png_job job = {.path = path, .err = err, .writing = true, .note = note};
     job.file = fopen(a.temp_path, "wb");
     weft_err status = job.file ? write_stream(&job, raster)
                                : weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be written", path);

@@ -10,6 +10,10 @@ weft_err weft_png_read(const char *path, weft_raster *raster, weft_error *err);
 /** Writes a PNG of raster->bits, whole or not at all. */
 weft_err weft_png_write(const char *path, const weft_raster *raster, weft_error *err);
 
+/** The same with what the file says of the picture.  @param note  may be NULL */
+weft_err weft_png_write_noted(const char *path, const weft_raster *raster, const weft_raster_note *note,
+                              weft_error *err);
+
 /** Appends the bytes of a PNG file to `out`, where failures stick. */
 weft_err weft_png_encode(const weft_raster *raster, weft_text_buffer *out);
 

@@ -14,6 +14,14 @@ typedef struct weft_raster {
     uint16_t *data; /* [height][width][channels], 0..(1 << bits) - 1 */
 } weft_raster;
 
+/** What a file says of its picture besides the samples.  Borrowed; NULL and 0: not said. */
+typedef struct weft_raster_note {
+    const void *icc; /* ICC profile */
+    size_t icc_size;
+    const char *description, *software;
+    const char *make, *model, *date_time; /* of the camera; TIFF only */
+} weft_raster_note;
+
 weft_err weft_raster_init(weft_raster *raster, int width, int height, int channels, int bits,
                           weft_error *err);
 void weft_raster_fini(weft_raster *raster);

@@ -196,7 +196,26 @@ static bool write_rows(TIFF *tiff, const weft_raster *raster, void *line)
     return true;
 }
 
+static bool set_text(TIFF *tiff, uint32_t tag, const char *text)
+{
+    return !text || !text[0] || TIFFSetField(tiff, tag, text);
+}
+
+static bool set_note(TIFF *tiff, const weft_raster_note *n)
+{
+    return !n || ((!n->icc || TIFFSetField(tiff, TIFFTAG_ICCPROFILE, (uint32_t)n->icc_size, n->icc)) &&
+                  set_text(tiff, TIFFTAG_IMAGEDESCRIPTION, n->description) &&
+                  set_text(tiff, TIFFTAG_SOFTWARE, n->software) && set_text(tiff, TIFFTAG_MAKE, n->make) &&
+                  set_text(tiff, TIFFTAG_MODEL, n->model) && set_text(tiff, TIFFTAG_DATETIME, n->date_time));
+}
+
 weft_err weft_tiff_write(const char *path, const weft_raster *raster, weft_error *err)
+{
+    return weft_tiff_write_noted(path, raster, NULL, err);
+}
+
+weft_err weft_tiff_write_noted(const char *path, const weft_raster *raster, const weft_raster_note *note,
+                               weft_error *err)
 {
     weft_tiff_log log = {.path = path};
     weft_atomic a;
@@ -205,7 +224,8 @@ weft_err weft_tiff_write(const char *path, const weft_raster *raster, weft_error
     void *const line = weft_alloc((size_t)raster->width * (size_t)raster->channels, 2, err);
     weft_err status = line ? weft_tiff_open(&tiff, a.temp_path, "w", &log, err) : WEFT_ERR_NOMEM;
     if (status == WEFT_OK) {
-        if (!set_tags(tiff, raster) || !write_rows(tiff, raster, line) || !TIFFFlush(tiff))
+        if (!set_tags(tiff, raster) || !set_note(tiff, note) || !write_rows(tiff, raster, line) ||
+            !TIFFFlush(tiff))
             log.failed = true;
         status = weft_tiff_close_written(tiff, &log, err);
     }

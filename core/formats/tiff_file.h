@@ -10,6 +10,10 @@ weft_err weft_tiff_read(const char *path, weft_raster *raster, weft_error *err);
 /** Writes an 8- or 16-bit TIFF, whole or not at all. */
 weft_err weft_tiff_write(const char *path, const weft_raster *raster, weft_error *err);
 
+/** The same with what the file says of the picture.  @param note  may be NULL */
+weft_err weft_tiff_write_noted(const char *path, const weft_raster *raster, const weft_raster_note *note,
+                               weft_error *err);
+
 /** What a raw frame says of itself.  Unknown numbers are 0, unknown texts empty. */
 typedef struct weft_frame_info {
     double exposure_s;
