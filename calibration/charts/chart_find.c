@@ -227,6 +227,12 @@ static weft_err explain_nothing(const search *s, weft_error *err)
             err, WEFT_ERR_NODATA,
             "no %s chart found: the %d x %d patches in the picture (%d seen) are not its %d x %d; " REMEDY,
             chart->name, n->columns, n->rows, n->n_seen, chart->columns, chart->rows);
+    if (!(n->best.score > 0) && n->columns * n->rows < n_patches(chart))
+        return weft_fail(
+            err, WEFT_ERR_NODATA,
+            "no %s chart found: %d patches stand in %d x %d, the chart has %d x %d: a part of it is "
+            "outside the picture or covered; " REMEDY,
+            chart->name, n->n_seen, n->columns, n->rows, chart->columns, chart->rows);
     return weft_fail(
         err, WEFT_ERR_NODATA,
         "no %s chart found: %d patches stand in %d x %d, but the chart's colours explain %.2f of what "

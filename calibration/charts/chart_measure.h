@@ -20,7 +20,7 @@ typedef struct weft_patch_reading {
     int n[WEFT_SITES];          /* photosites that count */
     double clipped;             /* share of photosites that are not trustworthy */
     double outliers;            /* share that was left out */
-    double unevenness;          /* relative deviation of parts of the patch from a plane, noise apart: stains */
+    double unevenness; /* relative deviation of parts of the patch from a plane, noise apart: stains */
 } weft_patch_reading;
 
 /**

@@ -1,13 +1,14 @@
 #include "calibration/charts/patch_colour.h"
 
-#include "calibration/calibration.h"
 #include "calibration/charts/robust.h"
+#include "core/text.h"
 
 #include <assert.h>
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
-const char *const weft_patch_clipped = "clipped under more than half of the lights";
+const char *const weft_patch_clipped = "clipped";
 const char *const weft_patch_unsteady = "the lights disagree by more than 5 %";
 const char *const weft_patch_dark = "too dark";
 const char *const weft_patch_stained = "dust or a stain: it is not of one colour";
@@ -107,4 +108,55 @@ void weft_patch_colours(const weft_chart *chart, const weft_patch_light *lights,
         else if (colours[p].spread > unsteady || 2 * v.n < n_lights)
             colours[p].excluded = weft_patch_unsteady;
     }
+}
+
+weft_err weft_patch_exclude(const weft_chart *chart, const weft_texts *names, weft_patch_colour *colours,
+                            weft_error *err)
+{
+    const int n = chart->columns * chart->rows;
+    for (int i = 0; i < names->n; i++) {
+        int patch = -1, number;
+        if (weft_text_to_int(names->values[i], &number) && number >= 1 && number <= n)
+            patch = number - 1;
+        for (int p = 0; p < n && patch < 0; p++)
+            if (strcasecmp(chart->patches[p].name, names->values[i]) == 0)
+                patch = p;
+        if (patch < 0)
+            return weft_fail(
+                err, WEFT_ERR_USAGE,
+                "--exclude %s: the chart has no such patch; give its number, 1 to %d, or its name as "
+                "\"%s\"",
+                names->values[i], n, chart->patches[0].name);
+        colours[patch].excluded = weft_patch_by_hand;
+    }
+    return WEFT_OK;
+}
+
+weft_err weft_patch_samples(const weft_chart *chart, const weft_patch_colour *colours,
+                            weft_colour_sample *samples, weft_error *err)
+{
+    const int n = chart->columns * chart->rows;
+    int clipped = 0;
+    for (int p = 0; p < n; p++) {
+        memcpy(samples[p].camera, colours[p].camera, sizeof samples[p].camera);
+        memcpy(samples[p].reference, chart->patches[p].linear_srgb, sizeof samples[p].reference);
+        samples[p].used = !colours[p].excluded;
+        clipped += colours[p].excluded == weft_patch_clipped;
+    }
+    if (clipped > n / 4)
+        return weft_fail(err, WEFT_ERR_NODATA,
+                         "%d of %d patches are clipped: take the chart with a shorter exposure", clipped, n);
+    return WEFT_OK;
+}
+
+void weft_patch_fill_part(const weft_chart *chart, const weft_patch_colour *colours,
+                          const weft_colour_fit *fit, weft_colour_part *part)
+{
+    *part = (weft_colour_part){.model = fit->model,
+                               .delta_e_mean = fit->trained_mean,
+                               .delta_e_max = fit->trained_max,
+                               .delta_e_held_out_mean = fit->held_out_mean};
+    for (int p = 0; p < chart->columns * chart->rows; p++)
+        if (!colours[p].excluded)
+            memcpy(part->gamut[part->n_gamut++], chart->patches[p].linear_srgb, sizeof part->gamut[0]);
 }

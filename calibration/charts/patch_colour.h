@@ -2,8 +2,10 @@
 #ifndef WEFT_CALIBRATION_CHARTS_PATCH_COLOUR_H
 #define WEFT_CALIBRATION_CHARTS_PATCH_COLOUR_H
 
+#include "calibration/calibration.h"
 #include "calibration/charts/chart_measure.h"
 #include "calibration/charts/colour_fit.h"
+#include "core/fields.h"
 
 /** Readings under one light, and the linear value that a white patch would have in each place. */
 typedef struct weft_patch_light {
@@ -32,5 +34,18 @@ extern const char *const weft_patch_by_hand;  /* the user said so */
  */
 void weft_patch_colours(const weft_chart *chart, const weft_patch_light *lights, int n_lights,
                         weft_patch_colour *colours);
+
+/** Marks patches that the user named, by name (case ignored) or number from 1, as excluded by hand.
+ *  @return WEFT_ERR_USAGE for a name that the chart does not have */
+weft_err weft_patch_exclude(const weft_chart *chart, const weft_texts *names, weft_patch_colour *colours,
+                            weft_error *err);
+
+/** Samples for a fit.  @return WEFT_ERR_NODATA when more than a quarter of the patches is clipped */
+weft_err weft_patch_samples(const weft_chart *chart, const weft_patch_colour *colours,
+                            weft_colour_sample *samples, weft_error *err);
+
+/** The colour part of a calibration: the model, how good it is, and the colours it was fitted to. */
+void weft_patch_fill_part(const weft_chart *chart, const weft_patch_colour *colours,
+                          const weft_colour_fit *fit, weft_colour_part *part);
 
 #endif

@@ -24,7 +24,8 @@ void weft_chart_session_fini(weft_chart_session *session)
     *session = (weft_chart_session){0};
 }
 
-static weft_err check_options(const weft_invocation *inv, const weft_chart_options *options, weft_error *err)
+weft_err weft_chart_options_check(const weft_invocation *inv, const weft_chart_options *options,
+                                  weft_error *err)
 {
     if (options->corners.n != 0 && options->corners.n != 8)
         return weft_fail(err, WEFT_ERR_USAGE, "--corners wants 8 numbers (u,v of four corners), got %d",
@@ -121,7 +122,7 @@ weft_err weft_chart_session_open(const weft_invocation *inv, const weft_chart_op
                                  weft_chart_session *session, weft_error *err)
 {
     weft_chart_session s = {0};
-    WEFT_TRY(check_options(inv, options, err));
+    WEFT_TRY(weft_chart_options_check(inv, options, err));
     WEFT_TRY(weft_chart_find(chart, edition, &s.chart, err));
     weft_err status = weft_calibration_open(options->output, &s.cal, err);
     if (status == WEFT_OK)

@@ -63,6 +63,10 @@ typedef struct weft_chart_options {
         .help = "height of the chart's surface over the sample plane"                                        \
     }
 
+/** Refuses corners that are not eight numbers, and outputs that are there without --force. */
+weft_err weft_chart_options_check(const weft_invocation *inv, const weft_chart_options *options,
+                                  weft_error *err);
+
 typedef weft_patch_reading weft_chart_readings[WEFT_CHART_MAX_PATCHES];
 
 typedef struct weft_chart_session {

@@ -1,4 +1,5 @@
 #include "host/cli/chart_session.h"
+#include "host/cli/colour_apply.h"
 #include "host/cli/command.h"
 
 #include "calibration/calibration_colour.h"
@@ -8,16 +9,15 @@
 #include "core/json.h"
 #include "core/log.h"
 #include "core/mem.h"
-#include "core/text.h"
 
 #include <string.h>
-#include <strings.h>
 
 typedef struct colour_args {
     weft_chart_options chart;
     const char *name, *edition;
     int method;
     weft_texts exclude;
+    weft_apply_options apply;
 } colour_args;
 
 static const weft_field fields[] = {
@@ -45,6 +45,7 @@ static const weft_field fields[] = {
      .unit = "PATCH",
      .help = "leave a patch out, by name or number from 1; may be given several times"},
     WEFT_CHART_FIELDS(colour_args, chart),
+    WEFT_APPLY_FIELDS(colour_args, apply),
     {0},
 };
 
@@ -127,67 +128,38 @@ static weft_err print(const weft_invocation *inv, const weft_chart_session *sess
     return WEFT_OK;
 }
 
-/* Marks the patches that the user named. */
-static weft_err exclude_patches(const weft_chart *chart, const weft_texts *names, weft_patch_colour *colours,
-                                weft_error *err)
-{
-    const int n = chart->columns * chart->rows;
-    for (int i = 0; i < names->n; i++) {
-        int patch = -1, number;
-        if (weft_text_to_int(names->values[i], &number) && number >= 1 && number <= n)
-            patch = number - 1;
-        for (int p = 0; p < n && patch < 0; p++)
-            if (strcasecmp(chart->patches[p].name, names->values[i]) == 0)
-                patch = p;
-        if (patch < 0)
-            return weft_fail(
-                err, WEFT_ERR_USAGE,
-                "--exclude %s: the chart has no such patch; give its number, 1 to %d, or its name as "
-                "\"%s\"",
-                names->values[i], n, chart->patches[0].name);
-        colours[patch].excluded = weft_patch_by_hand;
-    }
-    return WEFT_OK;
-}
-
-/* Into the calibration: the model, how good it is, and the colours it was fitted to. */
-static void keep_fit(weft_calibration *cal, const weft_chart *chart, const weft_patch_colour *colours,
-                     const weft_colour_fit *fit)
-{
-    weft_colour_part *const part = &cal->colour;
-    *part = (weft_colour_part){.model = fit->model,
-                               .delta_e_mean = fit->trained_mean,
-                               .delta_e_max = fit->trained_max,
-                               .delta_e_held_out_mean = fit->held_out_mean};
-    for (int p = 0; p < chart->columns * chart->rows; p++)
-        if (!colours[p].excluded)
-            memcpy(part->gamut[part->n_gamut++], chart->patches[p].linear_srgb, sizeof part->gamut[0]);
-    cal->has_colour = true;
-}
-
 static weft_err fit_colours(const weft_chart_session *session, const weft_patch_colour *colours,
                             weft_colour_method method, weft_colour_fit *fit, weft_error *err)
 {
-    weft_colour_sample samples[WEFT_CHART_MAX_PATCHES] = {0};
+    weft_colour_sample samples[WEFT_CHART_MAX_PATCHES];
     const int n = session->chart->columns * session->chart->rows;
-    int clipped = 0;
-    for (int p = 0; p < n; p++) {
-        memcpy(samples[p].camera, colours[p].camera, sizeof samples[p].camera);
-        memcpy(samples[p].reference, session->chart->patches[p].linear_srgb, sizeof samples[p].reference);
-        samples[p].used = !colours[p].excluded;
-        clipped += colours[p].excluded == weft_patch_clipped;
-    }
-    if (clipped > n / 4)
-        return weft_fail(err, WEFT_ERR_NODATA,
-                         "%s: %d of %d patches are clipped: take the chart with a shorter exposure",
-                         session->set.folder, clipped, n);
-    const weft_err status = weft_colour_fit_patches(samples, n, method, fit, err);
+    weft_err status = weft_patch_samples(session->chart, colours, samples, err);
+    if (status == WEFT_OK)
+        status = weft_colour_fit_patches(samples, n, method, fit, err);
     return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", session->set.folder);
+}
+
+static weft_err apply(const weft_invocation *inv, const colour_args *args, weft_error *err)
+{
+    const weft_apply_chart chart = {args->name,
+                                    args->edition,
+                                    args->chart.output,
+                                    args->chart.overlay,
+                                    &args->chart.corners,
+                                    &args->exclude,
+                                    (weft_colour_method)args->method};
+    WEFT_TRY(weft_chart_options_check(inv, &args->chart, err));
+    return weft_colour_apply(inv, &args->apply, &chart, err);
 }
 
 static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *err)
 {
     const colour_args *const args = vargs;
+    if (args->apply.apply)
+        return apply(inv, args, err);
+    if (inv->n_operands != 1)
+        return weft_fail(err, WEFT_ERR_USAGE, "one set is wanted, not %d (--apply takes many photographs)",
+                         inv->n_operands);
     weft_chart_session session;
     weft_patch_colour colours[WEFT_CHART_MAX_PATCHES] = {0};
     weft_colour_fit fit;
@@ -201,7 +173,7 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
     if (status == WEFT_OK)
         status = collect(&session, &args->chart, colours, err);
     if (status == WEFT_OK)
-        status = exclude_patches(session.chart, &args->exclude, colours, err);
+        status = weft_patch_exclude(session.chart, &args->exclude, colours, err);
     if (status == WEFT_OK)
         status = fit_colours(&session, colours, (weft_colour_method)args->method, &fit, err);
     if (status == WEFT_OK) {
@@ -210,7 +182,8 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
                       "it this "
                       "edition of the chart, and are the lights calibrated as they stand?",
                       fit.held_out_mean);
-        keep_fit(&session.cal, session.chart, colours, &fit);
+        weft_patch_fill_part(session.chart, colours, &fit, &session.cal.colour);
+        session.cal.has_colour = true;
         status = weft_calibration_set_report(&session.cal, "colour",
                                              report(&session, &args->chart, colours, &fit), err);
     }
@@ -229,9 +202,9 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
 const weft_command weft_cmd_calibrate_colour = {
     .name = "calibrate colour",
     .summary = "a Macbeth chart, found by itself: from camera RGB to linear sRGB",
-    .operands = "SET",
+    .operands = "SET | --apply PHOTO...",
     .min_operands = 1,
-    .max_operands = 1,
+    .max_operands = -1,
     .args_size = sizeof(colour_args),
     .fields = fields,
     .details =
@@ -239,7 +212,11 @@ const weft_command weft_cmd_calibrate_colour = {
         "divided by the light\n"
         "that its lamp puts on the chart, which also balances white.  The report gives "
         "CIEDE2000\nbefore, of the patches trained on, and of patches held out: believe the last.  Patches "
-        "that are clipped,\ndusty, too dark or unlike under different lights are left out and named.",
+        "that are clipped,\ndusty, too dark or unlike under different lights are left out and named.\n"
+        "With --apply it needs neither scanner nor calibration: a photograph of the chart (--chart-photo) "
+        "corrects any\nnumber of others under the same light into the folder of --output.  What is done is "
+        "not "
+        "done again; one that\nfails is named, and the rest goes on.",
     .example = "weft calibrate colour macbeth.set -o scanner.cal --overlay found.png",
     .run = run,
 };

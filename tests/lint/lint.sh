@@ -39,6 +39,7 @@ layers() {
     wrong host/light 'host/(cli|capture|solve|camera|set|rig)'
     wrong host/camera 'host/(cli|capture|solve|light|set|rig)'
     wrong host/solve 'host/(cli|capture|camera|light|rig)'
+    wrong host/photo 'host/(cli|daemon|library|capture|camera|light|rig)'
     wrong host/capture 'host/(cli|solve|rig)'
     wrong host/library 'host/(cli|daemon|capture|solve|camera|light|rig)'
     wrong host/daemon 'host/(capture|solve|camera|light|rig)'
