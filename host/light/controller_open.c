@@ -80,7 +80,7 @@ static weft_err say_hello(weft_controller *c, weft_hello_reply *hello, weft_erro
         (uint8_t)(1 + weft_controller_encode(c, WEFT_CMD_HELLO, payload, sizeof payload, wire + 1));
     const double end_s = weft_clock_s() + hello_within_s;
     for (int i = 0; weft_clock_s() < end_s; i++) {
-        bool got;
+        bool got = false;
         if (weft_cancelled())
             return weft_fail(err, WEFT_ERR_CANCELLED, "cancelled");
         WEFT_TRY(weft_serial_set_rate(&c->serial, rate_of_try(i), err));
@@ -130,7 +130,7 @@ static weft_err take_lease(weft_controller *c, int lease_ms, weft_error *err)
 /* Opens the port and shakes hands; the port is closed when it fails. */
 static weft_err meet(weft_controller *c, const char *port, weft_error *err)
 {
-    weft_hello_reply hello;
+    weft_hello_reply hello = {0};
     c->n = c->unread_at = c->unread_n = c->n_bytes = 0;
     c->too_long = false;
     c->n_events = 0;

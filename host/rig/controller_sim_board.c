@@ -3,7 +3,6 @@
 #include "core/mem.h"
 #include "host/rig/controller_sim_private.h"
 
-
 #include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -48,7 +48,7 @@ static void on_timer_mask_written(avr_irq_t *irq, uint32_t value, void *context)
 /* -- EEPROM --------------------------------------------------------------------------------------------- */
 
 /* Table 8-2: 26 368 cycles of the calibrated oscillator, 3.4 ms. */
-static const avr_cycle_count_t store_cycles = WEFT_SIM_CLOCK_HZ / 10000 * 34;
+static const avr_cycle_count_t store_cycles = (avr_cycle_count_t)WEFT_SIM_CLOCK_HZ * 34 / 10000;
 
 static avr_cycle_count_t end_storing(avr_t *avr, avr_cycle_count_t when, void *context)
 {

@@ -73,7 +73,8 @@ static void plug_in_new(int board, const char *elf, const char *number)
     make_link(board, board);
     if (!number)
         return;
-    memcpy(value, number, strlen(number));
+    for (size_t i = 0; i < sizeof value && number[i]; i++)
+        value[i] = (uint8_t)number[i];
     weft_controller *const c = open_it(boards[board].link);
     assert_ok(weft_controller_set_setting(c, WEFT_KEY_SERIAL_NUMBER, 0, value, err));
     weft_controller_close(c);

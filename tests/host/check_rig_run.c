@@ -217,6 +217,50 @@ static void nonsense_is_refused(void **state)
     assert_int_equal(rig_process_end(&rig, SIGINT), 0);
 }
 
+static void the_board_is_unplugged_and_comes_back(void **state)
+{
+    (void)state;
+    rig_process rig;
+    weft_controller *controller = NULL;
+    char dev[600], line[700];
+    rig_process_start(&rig, weft_test_path("rig-board"), options);
+    snprintf(dev, sizeof dev, "%s/dev", rig.dir);
+    assert_ok(weft_controller_open_under(dev, rig.pty, 1000, &controller, err));
+    assert_ok(
+        weft_controller_set_setting(controller, WEFT_KEY_SERIAL_NUMBER, 0, (const uint8_t *)"WL-00011", err));
+    weft_controller_close(controller);
+    assert_ok(weft_controller_open_under(dev, "serial:WL-00011", 1000, &controller, err));
+    json_decref(rig_process_tell(&rig, "board unplug"));
+    snprintf(line, sizeof line, "%s/ttyACM0", dev);
+    assert_int_not_equal(access(line, F_OK), 0);
+    assert_fails(weft_controller_keep_alive(controller, err), WEFT_ERR_DEVICE, "has vanished");
+    json_t *const back = rig_process_tell(&rig, "board plug");
+    assert_string_not_equal(json_string_value(json_object_get(back, "pty")), rig.pty);
+    json_decref(back);
+    assert_ok(weft_controller_reopen(controller, 5, err));
+    json_decref(rig_process_tell(&rig, "board lamp 6 open"));
+    json_decref(rig_process_tell(&rig, "board lamp 2 on"));
+    assert_ok(weft_controller_light(controller, 1 << 6, 256, 2000, NULL, err));
+    json_t *const broken = rig_process_tell(&rig, "state");
+    assert_int_equal(json_integer_value(json_array_get(json_object_get(broken, "lights_on"), 0)), 2);
+    assert_int_equal(json_integer_value(json_array_get(json_object_get(broken, "lights_driven"), 0)), 6);
+    json_decref(broken);
+    json_decref(rig_process_tell(&rig, "board line both drop 1"));
+    assert_fails(weft_controller_keep_alive(controller, err), WEFT_ERR_TIMEOUT, "does not answer");
+    json_decref(rig_process_tell(&rig, "board line both"));
+    json_decref(rig_process_tell(&rig, "board hang"));
+    check_refused(&rig, "board dance", "wanted: board reset, hang");
+    check_refused(&rig, "board lamp 10 on", "lamp 0..9");
+    check_refused(&rig, "board lamp 1 late", "lamp 0..9");
+    check_refused(&rig, "board line both drop 2", "P is 0 to 1");
+    check_refused(&rig, "board line both drop", "P is 0 to 1");
+    check_refused(&rig, "board line sideways", "in, out or both");
+    check_refused(&rig, "board unplug mains", "unplug [power]");
+    weft_controller_close(controller);
+    assert_int_equal(rig_process_end(&rig, 0), 0);
+    assert_int_not_equal(access(dev, F_OK), 0);
+}
+
 static void bad_starts_say_why(void **state)
 {
     (void)state;
@@ -252,6 +296,7 @@ int main(void)
         cmocka_unit_test(frames_show_the_lamp_that_is_on),
         cmocka_unit_test(truth_is_written_and_read),
         cmocka_unit_test(nonsense_is_refused),
+        cmocka_unit_test(the_board_is_unplugged_and_comes_back),
         cmocka_unit_test(bad_starts_say_why),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
