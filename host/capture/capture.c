@@ -5,6 +5,7 @@
 #include "core/mem.h"
 #include "core/sha256.h"
 #include "host/capture/auto_exposure.h"
+#include "host/capture/average.h"
 #include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
@@ -54,6 +55,7 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     o->lights = o->lights ? o->lights : every;
     o->level = o->level ? o->level : info->level_max;
     o->bracket = o->bracket ? o->bracket : 1;
+    o->average = o->average ? o->average : 1;
     o->gain = o->gain > 0 ? o->gain : weft_camera_get_state(run->shooter.camera)->gain;
     o->settle_s = o->settle_s > 0 ? o->settle_s : 0.005;
     o->deadline_s = o->deadline_s > 0 ? o->deadline_s : 6;
@@ -225,6 +227,29 @@ static weft_err shoot_until_good(capture_run *run, const weft_planned_frame *fra
     }
 }
 
+/* Each of the frames is judged by itself; what is kept is their mean, as a DNG. */
+static weft_err shoot_mean(capture_run *run, const weft_planned_frame *frame, weft_shot *shot,
+                           json_t *retries, weft_error *err)
+{
+    weft_captured_frame *const f = &run->shooter.frame;
+    weft_average mean = {0};
+    weft_err status = WEFT_OK;
+    for (int i = 0; i < run->o.average && status == WEFT_OK; i++) {
+        status = shoot_until_good(run, frame, shot, retries, err);
+        if (status == WEFT_OK && run->o.average > 1)
+            status = weft_average_add(&mean, &f->mosaic, err);
+        if (status == WEFT_OK && weft_cancelled())
+            status = weft_fail(err, WEFT_ERR_CANCELLED, "cancelled");
+    }
+    if (status == WEFT_OK && run->o.average > 1) {
+        weft_average_get(&mean, &f->mosaic);
+        f->file.size = 0;
+        status = weft_frame_stats_make(&f->mosaic, &shot->stats, err);
+    }
+    weft_average_fini(&mean);
+    return status;
+}
+
 static void remember_dark_mean(capture_run *run, const weft_shot *shot)
 {
     const weft_captured_frame *const f = &run->shooter.frame;
@@ -270,6 +295,8 @@ static json_t *describe_shot(const capture_run *run, const weft_planned_frame *f
     json_t *const o =
         json_pack("{s:s, s:I, s:O, s:o}", "taken", now, "sequence", (json_int_t)run->shooter.frame.sequence,
                   "retries", retries, "statistics", weft_frame_stats_to_json(&shot->stats));
+    if (o && run->o.average > 1)
+        json_object_set_new(o, "mean_of", json_integer(run->o.average));
     if (!o || (!frame->lights && !shot->proved))
         return o;
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
@@ -390,14 +417,14 @@ static weft_err keep_frame_awake(capture_run *run, const weft_planned_frame *fra
 
 static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_error *err)
 {
-    weft_shot shot;
+    weft_shot shot = {0};
     json_t *const retries = json_array();
     json_t *capture = NULL;
     weft_err status = WEFT_OK;
     if (frame->role == WEFT_ROLE_DARK && run->o.cap_lens)
         status = run->o.cap_lens(run->o.context, err);
     if (status == WEFT_OK)
-        status = shoot_until_good(run, frame, &shot, retries, err);
+        status = shoot_mean(run, frame, &shot, retries, err);
     if (status == WEFT_OK && !(capture = describe_shot(run, frame, &shot, retries)))
         status = weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the record of %s", frame->file);
     if (status == WEFT_OK) {
@@ -444,7 +471,8 @@ static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
     WEFT_TRY(complete_options(run, info, err));
     if (run->o.exposure_s <= 0)
         WEFT_TRY(find_exposure(run, info->n_lights, err));
-    weft_capture_plan_make(&run->o, info->n_lights, camera->suffix[0] ? camera->suffix : ".dng", &run->plan);
+    weft_capture_plan_make(&run->o, info->n_lights,
+                           camera->suffix[0] && run->o.average == 1 ? camera->suffix : ".dng", &run->plan);
     if (run->plan.n == 0)
         return weft_fail(err, WEFT_ERR_USAGE, "no frame is asked for");
     WEFT_TRY(check_exposures(run, err));

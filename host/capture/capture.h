@@ -32,6 +32,7 @@ typedef struct weft_capture_options {
     double exposure_s;  /* 0: found out so that the brightest thousandth lies at 70 % of the range */
     double gain;        /* 0: the camera's base gain */
     int bracket;        /* exposures per light, 1..WEFT_CAPTURE_MAX_BRACKET; 0: 1 */
+    int average;        /* frames of which each file is the mean, 1..WEFT_AVERAGE_MAX; 0: 1 */
     int level;          /* brightness of the lights, 1..level_max; 0: full */
     bool no_ambient;    /* no frame with all lights off */
     bool all;           /* also one frame with all lights on */

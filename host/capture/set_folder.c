@@ -184,6 +184,8 @@ weft_err weft_set_folder_adopt(const weft_set *set, weft_capture_options *o, wef
     WEFT_TRY(adopt_number(set, stored, "settle_s", &o->settle_s, err));
     WEFT_TRY(adopt_int(set, stored, "bracket", &o->bracket, err));
     WEFT_TRY(adopt_int(set, stored, "level", &o->level, err));
+    if (json_object_get(stored, "average")) /* sets of before had none */
+        WEFT_TRY(adopt_int(set, stored, "average", &o->average, err));
     WEFT_TRY(adopt_more(stored, "no_lights", &o->no_lights, set->folder, err));
     WEFT_TRY(adopt_more(stored, "no_ambient", &o->no_ambient, set->folder, err));
     WEFT_TRY(adopt_more(stored, "all", &o->all, set->folder, err));
@@ -193,12 +195,12 @@ weft_err weft_set_folder_adopt(const weft_set *set, weft_capture_options *o, wef
 weft_err weft_set_folder_remember(weft_set *set, const weft_capture_options *o,
                                   const weft_controller_info *controller, weft_error *err)
 {
-    json_t *const capture =
-        json_pack("{s:I, s:f, s:f, s:f, s:i, s:i, s:b, s:b, s:b, s:b, s:{s:s, s:s, s:s}}", "lights",
-                  (json_int_t)o->lights, "exposure_s", o->exposure_s, "gain", o->gain, "settle_s",
-                  o->settle_s, "bracket", o->bracket, "level", o->level, "no_lights", o->no_lights,
-                  "no_ambient", o->no_ambient, "all", o->all, "dark", o->dark, "controller", "firmware",
-                  controller->firmware, "git_id", controller->git_id, "serial", controller->serial_number);
+    json_t *const capture = json_pack(
+        "{s:I, s:f, s:f, s:f, s:i, s:i, s:i, s:b, s:b, s:b, s:b, s:{s:s, s:s, s:s}}", "lights",
+        (json_int_t)o->lights, "exposure_s", o->exposure_s, "gain", o->gain, "settle_s", o->settle_s,
+        "bracket", o->bracket, "level", o->level, "average", o->average, "no_lights", o->no_lights,
+        "no_ambient", o->no_ambient, "all", o->all, "dark", o->dark, "controller", "firmware",
+        controller->firmware, "git_id", controller->git_id, "serial", controller->serial_number);
     if (!set->other)
         set->other = json_object();
     if (!capture || json_object_set_new(set->other, "capture", capture) != 0)

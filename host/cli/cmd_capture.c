@@ -1,5 +1,7 @@
 /* weft capture: photographs a sample under every light. */
+#include "host/capture/average.h"
 #include "host/capture/capture.h"
+#include "host/capture/look.h"
 
 #include "core/log.h"
 #include "core/text.h"
@@ -14,8 +16,8 @@ typedef struct capture_args {
     weft_device_options devices;
     const char *lights, *exposure, *name, *trigger;
     double gain, settle_s;
-    int bracket, level;
-    bool ambient, no_ambient, dark, all_frame, only_all, resume;
+    int bracket, average, level;
+    bool ambient, no_ambient, dark, all_frame, only_all, resume, dry_run;
 } capture_args;
 
 static const weft_field capture_fields[] = {
@@ -45,6 +47,18 @@ static const weft_field capture_fields[] = {
      .min = 1,
      .max = WEFT_CAPTURE_MAX_BRACKET,
      .help = "exposures of each light, a factor of 4 apart, around --exposure (default 1)"},
+    {.key = "average",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(capture_args, average),
+     .unit = "N",
+     .min = 1,
+     .max = WEFT_AVERAGE_MAX,
+     .help = "each file is the mean of so many frames: less noise (default 1)"},
+    {.key = "dry-run",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, dry_run),
+     .help =
+         "keep nothing: print what clips under each light, and the exposure that suits; SET may be left out"},
     {.key = "level",
      .type = WEFT_FIELD_INT,
      .offset = offsetof(capture_args, level),
@@ -131,11 +145,12 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
                              weft_error *err)
 {
     *o = (weft_capture_options){
-        .folder = inv->operands[0],
+        .folder = inv->n_operands > 0 ? inv->operands[0] : NULL,
         .name = a->name,
         .no_lights = a->only_all,
         .gain = a->gain,
         .bracket = a->bracket,
+        .average = a->average,
         .level = a->level,
         .no_ambient = a->no_ambient || (a->only_all && !a->ambient),
         .all = a->all_frame || a->only_all,
@@ -148,6 +163,8 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
         o->trigger = WEFT_TRIGGER_WIRE;
     else if (a->trigger && strcmp(a->trigger, "software") != 0)
         return weft_fail(err, WEFT_ERR_USAGE, "--trigger %s: wanted software or wire", a->trigger);
+    if (inv->n_operands == 0 && !a->dry_run)
+        return weft_fail(err, WEFT_ERR_USAGE, "SET is missing");
     if (a->ambient && a->no_ambient)
         return weft_fail(err, WEFT_ERR_USAGE, "--ambient and --no-ambient exclude each other");
     if (a->only_all && (a->lights || a->bracket > 1))
@@ -198,6 +215,86 @@ static weft_err print_result(const weft_invocation *inv, const weft_set *set, co
     return WEFT_OK;
 }
 
+/* ---- a dry run ---- */
+
+static json_t *numbers(const weft_frame_stats *s, double (*get)(const weft_colour_stats *c))
+{
+    return json_pack("[f, f, f]", get(&s->colours[0]), get(&s->colours[1]), get(&s->colours[2]));
+}
+
+static double high_of(const weft_colour_stats *c)
+{
+    return c->high;
+}
+
+static double clipped_of(const weft_colour_stats *c)
+{
+    return c->clipped;
+}
+
+static json_t *look_to_json(const weft_capture_look *look)
+{
+    json_t *const lights = json_array();
+    for (int i = 0; i < look->n; i++) {
+        const weft_light_look *const l = &look->lights[i];
+        json_array_append_new(lights, json_pack("{s:i, s:o, s:o, s:f, s:f, s:s}", "light", l->light, "high",
+                                                numbers(&l->stats, high_of), "clipped",
+                                                numbers(&l->stats, clipped_of), "mean", l->stats.mean,
+                                                "suggested_s", l->suggested_s, "problem", l->reason));
+    }
+    return json_pack("{s:f, s:f, s:f, s:i, s:i, s:o}", "exposure_s", look->exposure_s, "gain", look->gain,
+                     "suggested_s", look->suggested_s, "bracket", look->bracket, "clipped_lights",
+                     look->n_clipped, "lights", lights);
+}
+
+static void print_look(const weft_capture_look *look, FILE *out)
+{
+    fprintf(out, "at %.4g s, gain %.3g       brightest thousandth, %%    clipped, %%\n", look->exposure_s,
+            look->gain);
+    fprintf(out, "%-10s %8s   %6s %6s %6s    %6s %6s %6s   suits\n", "light", "mean, %", "red", "green",
+            "blue", "red", "green", "blue");
+    for (int i = 0; i < look->n; i++) {
+        const weft_light_look *const l = &look->lights[i];
+        const weft_colour_stats *const c = l->stats.colours;
+        char name[16], suits[32] = "";
+        snprintf(name, sizeof name, "%d", l->light);
+        if (l->suggested_s > 0)
+            snprintf(suits, sizeof suits, "%.3g s", l->suggested_s);
+        else if (l->light >= 0 && !l->reason[0])
+            snprintf(suits, sizeof suits, "%s",
+                     weft_frame_stats_high(&l->stats) > 0.5 ? "shorter" : "longer");
+        if (l->reason[0])
+            fprintf(out, "%-10s %s\n", l->light < 0 ? "all off" : name, l->reason);
+        else
+            fprintf(out, "%-10s %8.2f   %6.1f %6.1f %6.1f    %6.3f %6.3f %6.3f   %s\n",
+                    l->light < 0 ? "all off" : name, 100 * l->stats.mean, 100 * c[0].high, 100 * c[1].high,
+                    100 * c[2].high, 100 * c[0].clipped, 100 * c[1].clipped, 100 * c[2].clipped, suits);
+    }
+    if (look->suggested_s > 0)
+        fprintf(out, "suggestion: --exposure %.2g%s\n", look->suggested_s,
+                look->bracket > 1 ? ", and a bracket: the lights differ much" : "");
+    if (look->bracket > 1)
+        fprintf(out, "            --bracket %d\n", look->bracket);
+}
+
+static weft_err dry_run(const weft_invocation *inv, const weft_capture_options *options,
+                        const weft_device_options *devices, weft_error *err)
+{
+    weft_camera_device *camera = NULL;
+    weft_controller *controller = NULL;
+    weft_progress progress = {0};
+    weft_capture_look look;
+    WEFT_TRY(weft_device_open_both(devices, &camera, &controller, err));
+    const weft_err status = weft_capture_look_at(options, camera, controller, &progress, &look, err);
+    weft_controller_close(controller);
+    weft_camera_close(camera);
+    WEFT_TRY(status);
+    if (inv->json)
+        return weft_print_json(inv, look_to_json(&look), err);
+    print_look(&look, inv->out);
+    return WEFT_OK;
+}
+
 static weft_err run_capture(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const capture_args *const a = args;
@@ -208,6 +305,8 @@ static weft_err run_capture(const weft_invocation *inv, const void *args, weft_e
     weft_capture_report report = {0};
     weft_set set = {0};
     WEFT_TRY(make_options(inv, a, &options, err));
+    if (a->dry_run)
+        return dry_run(inv, &options, &a->devices, err);
     WEFT_TRY(weft_capture_check_folder(&options, err));
     WEFT_TRY(weft_device_open_both(&a->devices, &camera, &controller, err));
     options.cap_lens = cap_lens;
@@ -225,7 +324,7 @@ const weft_command weft_cmd_capture = {
     .name = "capture",
     .summary = "photograph a sample under every light",
     .operands = "SET",
-    .min_operands = 1,
+    .min_operands = 0,
     .max_operands = 1,
     .args_size = sizeof(capture_args),
     .fields = capture_fields,

@@ -6,7 +6,9 @@
 #include "core/formats/raw_file.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "host/capture/average.h"
 #include "host/capture/frame_stats.h"
+#include "host/capture/look.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -302,6 +304,78 @@ static void test_long_exposures_stay_lit(void **state)
     assert_int_equal(bench.lit_before_end[1], 1 << 6);
 }
 
+static void test_a_mean_of_frames(void **state)
+{
+    (void)state;
+    enum { W = 64, H = 32, N = 16, LEVEL = 1000, SIGMA = 8 };
+    weft_average mean = {0};
+    weft_mosaic m;
+    uint64_t seed = 3;
+    double error = 0, square = 0;
+    assert_ok(weft_mosaic_init(&m, W, H, WEFT_CFA_RGGB, err));
+    m.white = 4000;
+    for (int i = 0; i < N; i++) {
+        for (int p = 0; p < W * H; p++)
+            m.data[p] = (uint16_t)lround(LEVEL + SIGMA * weft_test_gauss(&seed));
+        m.data[5] = i == 7 ? 4000 : 3990; /* clips once */
+        assert_ok(weft_average_add(&mean, &m, err));
+    }
+    weft_average_get(&mean, &m);
+    assert_int_equal(m.data[5], 4000);
+    for (int p = 6; p < W * H; p++) {
+        error += m.data[p] - LEVEL;
+        square += (m.data[p] - LEVEL) * (double)(m.data[p] - LEVEL);
+    }
+    assert_near(error / (W * H - 6), 0, 0.2);
+    assert_near(sqrt(square / (W * H - 6)), sqrt(SIGMA * SIGMA / (double)N + 1 / 12.0), 0.15);
+    weft_mosaic_fini(&m);
+    assert_ok(weft_mosaic_init(&m, W, H / 2, WEFT_CFA_RGGB, err));
+    assert_fails(weft_average_add(&mean, &m, err), WEFT_ERR_MISMATCH, "64 x 16");
+    weft_mosaic_fini(&m);
+    weft_average_fini(&mean);
+}
+
+static void test_each_file_is_a_mean(void **state)
+{
+    (void)state;
+    weft_capture_options options = {
+        .folder = weft_test_path("mean.set"), .exposure_s = 0.04, .lights = 1, .average = 5};
+    weft_capture_report report;
+    weft_set set;
+    plan_deed(LOSE_PACKETS, 7, 1);
+    assert_ok(run(&options, &set, &report, err));
+    assert_int_equal(set.n_frames, 2);
+    assert_int_equal(bench.n_exposures, 11); /* 2 x 5, and one that was taken again */
+    assert_int_equal(report.n_retries, 1);
+    assert_int_equal(json_integer_value(json_object_get(set.frames[1].capture, "mean_of")), 5);
+    weft_set_fini(&set);
+    options.resume = true;
+    options.average = 4;
+    assert_fails(run(&options, &set, &report, err), WEFT_ERR_MISMATCH, "average 5, not 4");
+}
+
+static void test_a_look_before_the_set(void **state)
+{
+    (void)state;
+    const weft_capture_options options = {.exposure_s = 0.04, .lights = 7};
+    weft_progress progress = {0};
+    weft_capture_look look;
+    const double powers[] = {0.9, 100}; /* well lit; far beyond white */
+    for (int i = 0; i < 2; i++) {
+        bench.power = powers[i];
+        assert_ok(weft_capture_look_at(&options, bench.camera, bench.controller, &progress, &look, err));
+        assert_int_equal(look.n, 4);
+        assert_true(look.lights[0].light == -1 && look.lights[3].light == 2);
+        assert_near(look.suggested_s * (powers[i] + bench.room), 0.70, 0.05);
+        assert_int_equal(look.n_clipped, i == 0 ? 0 : 3);
+        assert_int_equal(look.bracket, 1);
+    }
+    weft_capture_options wrong = options;
+    wrong.lights = 1 << 20;
+    assert_fails(weft_capture_look_at(&wrong, bench.camera, bench.controller, &progress, &look, err),
+                 WEFT_ERR_RANGE, "there is no light 20");
+}
+
 static void test_statistics(void **state)
 {
     (void)state;
@@ -332,6 +406,9 @@ int main(void)
 #define ON_BENCH(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_statistics),
+        cmocka_unit_test(test_a_mean_of_frames),
+        ON_BENCH(test_each_file_is_a_mean),
+        ON_BENCH(test_a_look_before_the_set),
         ON_BENCH(test_a_full_set),
         ON_BENCH(test_bad_frames_are_taken_again_and_it_is_told),
         ON_BENCH(test_a_lamp_that_never_lights_is_named),
