@@ -44,7 +44,7 @@ static weft_err finish(const weft_invocation *inv, json_t *list, const int count
     const int failed = counts[WEFT_DOCTOR_FAILED], warnings = counts[WEFT_DOCTOR_WARNING];
     if (inv->json)
         WEFT_TRY(weft_print_json(inv,
-                                 json_pack("{s:b, s:i, s:i, s:o}", "ok", failed == 0, "failed", failed,
+                                 json_pack("{s:b, s:i, s:i, s:O}", "ok", failed == 0, "failed", failed,
                                            "warnings", warnings, "checks", list),
                                  err));
     else
@@ -78,7 +78,7 @@ static weft_err run(const weft_invocation *inv, const void *data, weft_error *er
     }
     weft_controller_close(doctor.controller);
     if (status == WEFT_OK)
-        status = finish(inv, json_incref(list), counts, err);
+        status = finish(inv, list, counts, err);
     json_decref(list);
     return status;
 }
