@@ -10,6 +10,17 @@
 #include <string.h>
 #include <unistd.h>
 
+/* libgphoto2 2.5.30 forgets some bytes at each event it asks for, and unloads the driver that did so: no list
+ * of leaks can name it.  What it allocates inside a call is its own affair. */
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+#define LEAKS_BEGIN() __lsan_disable()
+#define LEAKS_END()   __lsan_enable()
+#else
+#define LEAKS_BEGIN() (void)0
+#define LEAKS_END()   (void)0
+#endif
+
 /* ---- errors ---- */
 
 #define REPLUG "; switch it off and on, check the cable and try again"
@@ -92,6 +103,7 @@ static void on_error(GPContext *context, const char *text, void *data)
 /* libgphoto2 writes some failures straight to stderr, where only our one line belongs. */
 int gphoto_hush(void)
 {
+    LEAKS_BEGIN();
     const int null = open("/dev/null", O_WRONLY | O_CLOEXEC);
     const int kept = null >= 0 ? fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 10) : -1;
     if (kept >= 0)
@@ -103,6 +115,7 @@ int gphoto_hush(void)
 
 void gphoto_unhush(int kept)
 {
+    LEAKS_END();
     if (kept < 0)
         return;
     dup2(kept, STDERR_FILENO);
@@ -169,21 +182,24 @@ static void spell_port(const char *address, char *port, size_t size)
         snprintf(port, size, "%s", address);
 }
 
-static int set_model(Camera *camera, const char *model, GPContext *context)
+/* Network cameras are not looked for, so their driver is named.  Asking all drivers for their lists of models
+ * takes a third of a second; the answer is always the same. */
+static int set_network_driver(gphoto_session *s)
 {
+    static CameraAbilities network;
     CameraAbilitiesList *list = NULL;
-    CameraAbilities abilities;
-    int code = gp_abilities_list_new(&list);
-    if (code == GP_OK)
-        code = gp_abilities_list_load(list, context);
-    if (code >= GP_OK)
-        code = gp_abilities_list_lookup_model(list, model);
-    if (code >= GP_OK)
-        code = gp_abilities_list_get_abilities(list, code, &abilities);
-    if (code == GP_OK)
-        code = gp_camera_set_abilities(camera, abilities);
-    gp_abilities_list_free(list);
-    return code;
+    int code = GP_OK;
+    if (!network.model[0]) {
+        code = gp_abilities_list_new(&list);
+        if (code == GP_OK)
+            code = gp_abilities_list_load(list, s->context);
+        if (code >= GP_OK)
+            code = gp_abilities_list_lookup_model(list, "PTP/IP Camera");
+        if (code >= GP_OK)
+            code = gp_abilities_list_get_abilities(list, code, &network);
+        gp_abilities_list_free(list);
+    }
+    return code == GP_OK ? gp_camera_set_abilities(s->camera, network) : code;
 }
 
 static int set_port(Camera *camera, const char *port)
@@ -203,12 +219,11 @@ static int set_port(Camera *camera, const char *port)
     return code;
 }
 
-/* A network camera is not looked for, so its driver must be named. */
 static int connect_port(gphoto_session *s)
 {
     int code = gp_camera_new(&s->camera);
     if (code == GP_OK && strncmp(s->port, "ptpip:", 6) == 0)
-        code = set_model(s->camera, "PTP/IP Camera", s->context);
+        code = set_network_driver(s);
     if (code == GP_OK)
         code = set_port(s->camera, s->port);
     return code == GP_OK ? gp_camera_init(s->camera, s->context) : code;
