@@ -66,10 +66,9 @@ static const struct {
 static bool is_forbidden(const char *port)
 {
     char path[64];
-    unsigned bus, device;
-    if (sscanf(port, "usb:%3u,%3u", &bus, &device) != 2)
+    if (strlen(port) != strlen("usb:001,042") || strncmp(port, "usb:", 4) != 0)
         return false;
-    snprintf(path, sizeof path, "/dev/bus/usb/%03u/%03u", bus, device);
+    snprintf(path, sizeof path, "/dev/bus/usb/%.3s/%.3s", port + 4, port + 8);
     return access(path, R_OK | W_OK) != 0 && errno == EACCES;
 }
 

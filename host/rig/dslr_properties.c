@@ -194,7 +194,7 @@ uint16_t dslr_property_describe(const dslr_properties *p, unsigned code, ptp_wri
     ptp_put(w, row->list ? ENUMERATION : RANGE, 1);
     if (row->list)
         ptp_put(w, (uint64_t)row->n_list, 2);
-    for (int k = 0; k < row->n_list; k++)
+    for (int k = 0; row->list && k < row->n_list; k++)
         ptp_put(w, row->list[k], size);
     if (!row->list) {
         ptp_put(w, row->min, size);

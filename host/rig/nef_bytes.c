@@ -98,8 +98,7 @@ static void write_header(const weft_nef_info *info, uint32_t raw_width, uint8_t 
     ptp_writer values = {
         .bytes = bytes, .size = HEADER_BYTES, .used = exif_offset + 2 + N_EXIF * ENTRY_BYTES + 4};
     directory d = {.entries = {.bytes = bytes, .size = HEADER_BYTES}, .values = &values};
-    memcpy(bytes, "II*\0", 4);
-    d.entries.used = 4;
+    ptp_put(&d.entries, 0x002a4949, 4); /* "II", 42 */
     ptp_put(&d.entries, main_offset, 4);
     ptp_put(&d.entries, N_MAIN, 2);
     add_main(&d, info, raw_width, exif_offset);

@@ -18,7 +18,7 @@ static uint8_t code(double value, double black, double white)
 static void make_row(int width, const uint16_t *upper, double black, double white, uint8_t *rgb)
 {
     const uint16_t *const lower = upper + width;
-    for (int u = 0; u < width / 2; u++) {
+    for (size_t u = 0; u < (size_t)width / 2; u++) {
         rgb[3 * u] = code(upper[2 * u], black, white);
         rgb[3 * u + 1] = code(0.5 * (upper[2 * u + 1] + lower[2 * u]), black, white);
         rgb[3 * u + 2] = code(lower[2 * u + 1], black, white);

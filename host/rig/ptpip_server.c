@@ -273,7 +273,7 @@ static bool serve_request(ptpip_server *s, size_t n)
     const bool has_data = ptp_get(s->packet, 4) == DATA_FROM_CLIENT;
     const uint32_t transaction = (uint32_t)ptp_get(s->packet + 6, 4);
     request.code = (uint16_t)ptp_get(s->packet + 4, 2);
-    request.n_params = n - 10 > 4 * PTP_MAX_PARAMS ? PTP_MAX_PARAMS : (int)(n - 10) / 4;
+    request.n_params = n - 10 > (size_t)4 * PTP_MAX_PARAMS ? PTP_MAX_PARAMS : (int)(n - 10) / 4;
     for (int i = 0; i < request.n_params; i++)
         request.params[i] = (uint32_t)ptp_get(s->packet + 10 + 4 * (size_t)i, 4);
     if (has_data && !read_data_phase(s, &request))

@@ -9,6 +9,7 @@
 #include "core/formats/raw_file.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/text.h"
 #include "host/camera/camera.h"
 #include "host/camera/gphoto_bodies.h"
 #include "tests/host/rig_process.h"
@@ -18,7 +19,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define DEADLINE_S 1.0
+#define DEADLINE_S  1.0
+#define FRAME_BYTES ((size_t)2 * 308 * 204)
 
 extern const weft_camera_backend weft_camera_gphoto;
 
@@ -249,7 +251,7 @@ static void check_file(void)
     assert_ok(weft_file_write(path, frame.file.bytes, frame.file.size, err));
     assert_ok(weft_raw_read(path, &read, &info, err));
     assert_true(read.width == 308 && read.height == 204 && read.white == 15846);
-    assert_memory_equal(read.data, frame.mosaic.data, 2 * 308 * 204);
+    assert_memory_equal(read.data, frame.mosaic.data, FRAME_BYTES);
     assert_near(info.exposure_s, 0.02, 1e-6);
     assert_near(info.iso, 100, 0);
     assert_string_equal(info.serial, "6001234");
@@ -334,7 +336,9 @@ static void test_waiting_can_be_cancelled(void **state)
 static double busy_s(void)
 {
     const char *const text = getenv("WEFT_TEST_BUSY_S");
-    return text ? atof(text) : 3;
+    double seconds = 3;
+    assert_true(!text || weft_text_to_double(text, &seconds));
+    return seconds;
 }
 
 static void order_busy(const char *fault)
@@ -478,10 +482,10 @@ static void test_dslr_picture_before_announced_again(void **state)
     expose_whole();
     assert_ok(weft_mosaic_init(&last, 308, 204, WEFT_CFA_RGGB, err));
     for (int i = 0; i < 3; i++) {
-        memcpy(last.data, frame.mosaic.data, 2 * 308 * 204);
+        memcpy(last.data, frame.mosaic.data, FRAME_BYTES);
         order("fault stale 1");
         expose_whole();
-        assert_memory_not_equal(last.data, frame.mosaic.data, 2 * 308 * 204);
+        assert_memory_not_equal(last.data, frame.mosaic.data, FRAME_BYTES);
     }
     weft_mosaic_fini(&last);
 }
