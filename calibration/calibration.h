@@ -18,12 +18,16 @@
 #define WEFT_CALIBRATION_VERSION 2   /* written when the file says something that version 1 does not know */
 #define WEFT_LIGHTS_MAX          128 /* the largest open benchmark sets have 100 */
 
+/** Coefficients of a lens. */
+#define WEFT_DISTORTION 8
+
 /** Pinhole camera with OpenCV's distortion, and its pose over the sample plane. */
 typedef struct weft_camera {
     int width, height;     /* px of the frames it holds for */
     double fx, fy, cx, cy; /* px */
-    double distortion[5];  /* k1, k2, p1, p2, k3 */
-    double rms_px;         /* reprojection error of the fit */
+    /* k1, k2, p1, p2, k3, k4, k5, k6; the last three are the rational model's and 0 without it */
+    double distortion[WEFT_DISTORTION];
+    double rms_px; /* reprojection error of the fit */
     bool has_pose;
     weft_mat3 rotation;    /* world to camera: x_c = R x_w + t */
     weft_vec3 translation; /* mm */

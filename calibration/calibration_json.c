@@ -73,8 +73,11 @@ static weft_err get_camera(const json_t *object, weft_camera *camera, const char
     WEFT_TRY(weft_json_get_number(object, "fy", need, 1e-3, 1e8, &camera->fy, place, err));
     WEFT_TRY(weft_json_get_number(object, "cx", need, -1e6, 1e6, &camera->cx, place, err));
     WEFT_TRY(weft_json_get_number(object, "cy", need, -1e6, 1e6, &camera->cy, place, err));
-    WEFT_TRY(
-        weft_json_get_numbers(object, "distortion", WEFT_JSON_OPTIONAL, 5, camera->distortion, place, err));
+    /* Five coefficients, or eight of the rational model. */
+    const int n_distortion =
+        json_array_size(json_object_get(object, "distortion")) == WEFT_DISTORTION ? WEFT_DISTORTION : 5;
+    WEFT_TRY(weft_json_get_numbers(object, "distortion", WEFT_JSON_OPTIONAL, n_distortion, camera->distortion,
+                                   place, err));
     WEFT_TRY(weft_json_get_number(object, "rms_px", WEFT_JSON_OPTIONAL, 0, 1e6, &camera->rms_px, place, err));
     return get_pose(object, camera, place, err);
 }
@@ -223,9 +226,11 @@ weft_err weft_calibration_from_json(const json_t *root, const char *place, weft_
 
 static json_t *camera_json(const weft_camera *c)
 {
-    json_t *const object = json_pack("{s:i, s:i, s:f, s:f, s:f, s:f, s:o, s:f}", "width", c->width, "height",
-                                     c->height, "fx", c->fx, "fy", c->fy, "cx", c->cx, "cy", c->cy,
-                                     "distortion", weft_json_numbers(c->distortion, 5), "rms_px", c->rms_px);
+    const bool rational = c->distortion[5] != 0 || c->distortion[6] != 0 || c->distortion[7] != 0;
+    json_t *const object =
+        json_pack("{s:i, s:i, s:f, s:f, s:f, s:f, s:o, s:f}", "width", c->width, "height", c->height, "fx",
+                  c->fx, "fy", c->fy, "cx", c->cx, "cy", c->cy, "distortion",
+                  weft_json_numbers(c->distortion, rational ? WEFT_DISTORTION : 5), "rms_px", c->rms_px);
     if (object && c->has_pose) {
         json_object_set_new(object, "rotation", weft_json_numbers(c->rotation.m, 9));
         json_object_set_new(object, "translation_mm", vec3_json(c->translation));

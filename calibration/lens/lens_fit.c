@@ -2,6 +2,7 @@
 
 #include "calibration/lens/lens_model.h"
 #include "calibration/lens/lens_module.h"
+#include "core/log.h"
 #include "core/mem.h"
 
 #include <assert.h>
@@ -13,6 +14,10 @@
 #define OUTLIER_PX       0.25
 #define OUTLIER_FACTOR   3
 #define FOCAL_SIGMA_MOST 0.01
+#define BLUR_FACTOR      2.5  /* times the median edge */
+#define BLUR_LEAST_PX    3    /* no edge below it is blurred */
+#define RICHER_GAIN      0.97 /* of the held-out error, for more coefficients */
+#define BENT_GAIN        0.95 /* likewise, for a bent board */
 
 weft_err weft_board_check(const weft_board *board, weft_error *err)
 {
@@ -36,7 +41,12 @@ weft_err weft_board_find(const uint8_t *grey, int width, int height, const weft_
                                                board->rows, WINDOW_SHARE, corners, &why);
     if (result < 0)
         return weft_fail(err, WEFT_ERR_NODATA, "the corner finder failed: %s", why.text);
-    *found = result == 1;
+    *found = result > 0;
+    if (result == 2)
+        return weft_fail(
+            err, WEFT_ERR_NODATA,
+            "there are two boards of %dx%d inner corners in it; cover one, or take the picture again",
+            board->columns, board->rows);
     return WEFT_OK;
 }
 
@@ -52,11 +62,25 @@ static void fill_object(const weft_board *board, const double origin_mm[2], floa
         }
 }
 
+const char *weft_lens_model_name(weft_lens_model_choice model)
+{
+    static const char *const names[WEFT_LENS_N_MODELS] = {"k1k2p1p2", "k1k2p1p2k3", "rational"};
+    return model >= 0 && model < WEFT_LENS_N_MODELS ? names[model] : "auto";
+}
+
+/* What a fit leaves free. */
+typedef struct fit_model {
+    weft_lens_model_choice terms;
+    bool bent;
+} fit_model;
+
 /* Arrays of a fit: allocated once, used by all its rounds. */
 typedef struct fit_work {
     const weft_lens_opencv *opencv;
-    int n_points, width, height;
+    int n_points, columns, width, height;
     float *object;    /* [n_points][3] */
+    float *bent;      /* [n_points][3] the board as found */
+    float *residuals; /* [n_views][n_points][2] of the packed views */
     float *image;     /* [n_views][n_points][2]: the views that take part, packed */
     double *per_view; /* [n_views] of the packed views */
     double *sorted;   /* [n_views] */
@@ -66,6 +90,8 @@ typedef struct fit_work {
 static void work_fini(fit_work *work)
 {
     weft_free(work->object);
+    weft_free(work->bent);
+    weft_free(work->residuals);
     weft_free(work->image);
     weft_free(work->per_view);
     weft_free(work->sorted);
@@ -76,6 +102,8 @@ static weft_err work_init(fit_work *work, const weft_board *board, int n_views, 
 {
     const size_t views = (size_t)n_views, points = (size_t)work->n_points;
     if (!(work->object = weft_alloc(3 * points, sizeof(float), err)) ||
+        !(work->bent = weft_alloc(3 * points, sizeof(float), err)) ||
+        !(work->residuals = weft_alloc(2 * points * views, sizeof(float), err)) ||
         !(work->image = weft_alloc(2 * points * views, sizeof(float), err)) ||
         !(work->per_view = weft_alloc(views, sizeof(double), err)) ||
         !(work->sorted = weft_alloc(views, sizeof(double), err)) ||
@@ -85,11 +113,13 @@ static weft_err work_init(fit_work *work, const weft_board *board, int n_views, 
     return WEFT_OK;
 }
 
-/* One fit of the used views but `skip` (-1: of all). */
+/* One fit of the used views but `skip` (-1: of all); the board comes out in work->bent. */
 static weft_err fit_views(fit_work *work, const weft_board_view *views, int n_views, int skip,
-                          weft_lens_estimate *estimate, int *n_used, weft_error *err)
+                          fit_model model, weft_lens_estimate *estimate, int *n_used, weft_error *err)
 {
     const size_t n = 2 * (size_t)work->n_points;
+    static const weft_lens_terms terms[WEFT_LENS_N_MODELS] = {WEFT_LENS_TERMS_4, WEFT_LENS_TERMS_5,
+                                                              WEFT_LENS_TERMS_8};
     weft_lens_why why;
     *n_used = 0;
     for (int i = 0; i < n_views; i++)
@@ -98,7 +128,8 @@ static weft_err fit_views(fit_work *work, const weft_board_view *views, int n_vi
             work->packed[(*n_used)++] = i;
         }
     if (work->opencv->calibrate(*n_used, work->n_points, work->object, work->image, work->width, work->height,
-                                estimate, work->per_view, &why) != 0)
+                                terms[model.terms], model.bent ? work->columns - 1 : -1, estimate, work->bent,
+                                work->per_view, work->residuals, &why) != 0)
         return weft_fail(err, WEFT_ERR_NODATA, "the fit of the lens failed: %s", why.text);
     return WEFT_OK;
 }
@@ -125,7 +156,13 @@ static int find_outlier(const fit_work *work, int n)
 static weft_err too_few(const weft_board_view *views, int n_views, int n_used, weft_error *err)
 {
     for (int i = 0; i < n_views; i++)
-        if (!views[i].used)
+        if (views[i].blurred)
+            return weft_fail(
+                err, WEFT_ERR_NODATA,
+                "%d views are left without the blurred ones (%s: edges %.1f px wide); wanted %d or more, "
+                "sharp: focus, and hold the board still",
+                n_used, views[i].name, views[i].edge_px, WEFT_LENS_MIN_VIEWS);
+        else if (!views[i].used)
             return weft_fail(
                 err, WEFT_ERR_NODATA,
                 "too many views contradict the others (%s by %.2f px, %d in all): is the board flat, "
@@ -137,7 +174,25 @@ static weft_err too_few(const weft_board_view *views, int n_views, int n_used, w
                      n_used, WEFT_LENS_MIN_VIEWS);
 }
 
-static weft_err fit_without_outliers(fit_work *work, weft_board_view *views, int n_views,
+/* Views whose edges are far wider than the others'. */
+static void leave_out_blurred(fit_work *work, weft_board_view *views, int n_views)
+{
+    int n = 0;
+    for (int i = 0; i < n_views; i++)
+        if (views[i].edge_px > 0)
+            work->sorted[n++] = views[i].edge_px;
+    if (n == 0)
+        return;
+    qsort(work->sorted, (size_t)n, sizeof *work->sorted, compare_doubles);
+    const double limit = fmax(BLUR_FACTOR * work->sorted[n / 2], BLUR_LEAST_PX);
+    for (int i = 0; i < n_views; i++)
+        if (views[i].edge_px > limit) {
+            views[i].blurred = true;
+            views[i].used = false;
+        }
+}
+
+static weft_err fit_without_outliers(fit_work *work, weft_board_view *views, int n_views, fit_model model,
                                      weft_lens_estimate *estimate, int *n_used, weft_error *err)
 {
     for (;;) {
@@ -146,7 +201,7 @@ static weft_err fit_without_outliers(fit_work *work, weft_board_view *views, int
             left += views[i].used;
         if (left < WEFT_LENS_MIN_VIEWS || 3 * (n_views - left) > n_views)
             return too_few(views, n_views, left, err);
-        WEFT_TRY(fit_views(work, views, n_views, -1, estimate, n_used, err));
+        WEFT_TRY(fit_views(work, views, n_views, -1, model, estimate, n_used, err));
         for (int i = 0; i < *n_used; i++)
             views[work->packed[i]].rms_px = work->per_view[i];
         const int worst = find_outlier(work, *n_used);
@@ -158,7 +213,7 @@ static weft_err fit_without_outliers(fit_work *work, weft_board_view *views, int
 
 /* Leave one view out: how well does the lens predict a view it has not seen? */
 static weft_err held_out_error(fit_work *work, const weft_board_view *views, int n_views, int n_used,
-                               double *held_out_px, weft_error *err)
+                               fit_model model, double *held_out_px, weft_error *err)
 {
     double sum = 0;
     *held_out_px = 0;
@@ -171,9 +226,9 @@ static weft_err held_out_error(fit_work *work, const weft_board_view *views, int
         int n;
         if (!views[i].used)
             continue;
-        WEFT_TRY(fit_views(work, views, n_views, i, &e, &n, err));
-        if (work->opencv->solve_pose(work->n_points, work->object, views[i].corners, e.camera, e.distortion,
-                                     rotation, translation, &rms, &why) != 0)
+        WEFT_TRY(fit_views(work, views, n_views, i, model, &e, &n, err));
+        if (work->opencv->solve_pose(work->n_points, model.bent ? work->bent : work->object, views[i].corners,
+                                     e.camera, e.distortion, rotation, translation, &rms, &why) != 0)
             return weft_fail(err, WEFT_ERR_NODATA, "%s: no pose of the board: %s", views[i].name, why.text);
         sum += rms * rms;
     }
@@ -181,22 +236,92 @@ static weft_err held_out_error(fit_work *work, const weft_board_view *views, int
     return WEFT_OK;
 }
 
-static double coverage(const fit_work *work, const weft_board_view *views, int n_views)
+static void fill_coverage(const fit_work *work, const weft_board_view *views, int n_views,
+                          weft_lens_report *r)
 {
-    enum { COLUMNS = 8, ROWS = 6 };
-    bool seen[ROWS][COLUMNS] = {{false}};
     int n = 0;
     for (int i = 0; i < n_views; i++)
         for (int p = 0; views[i].used && p < work->n_points; p++) {
             const float *const corner = views[i].corners + 2 * (size_t)p;
             const double u = (double)corner[0], v = (double)corner[1];
-            const int c = (int)(u * COLUMNS / work->width), r = (int)(v * ROWS / work->height);
-            if (u >= 0 && v >= 0 && c < COLUMNS && r < ROWS && !seen[r][c]) {
-                seen[r][c] = true;
-                n++;
-            }
+            const int column = (int)(u * WEFT_COVERAGE_COLUMNS / work->width),
+                      row = (int)(v * WEFT_COVERAGE_ROWS / work->height);
+            if (u >= 0 && v >= 0 && column < WEFT_COVERAGE_COLUMNS && row < WEFT_COVERAGE_ROWS)
+                n += r->map[row][column]++ == 0;
         }
-    return (double)n / (COLUMNS * ROWS);
+    r->coverage = (double)n / (WEFT_COVERAGE_COLUMNS * WEFT_COVERAGE_ROWS);
+}
+
+/* How far the found board is from a plane. */
+static double bend_of(const fit_work *work)
+{
+    double xx = 0, xy = 0, yy = 0, x = 0, y = 0, z = 0, xz = 0, yz = 0;
+    const double n = work->n_points;
+    for (int i = 0; i < work->n_points; i++) {
+        const double px = (double)work->bent[3 * i], py = (double)work->bent[3 * i + 1],
+                     pz = (double)work->bent[3 * i + 2];
+        x += px, y += py, z += pz, xx += px * px, xy += px * py, yy += py * py, xz += px * pz, yz += py * pz;
+    }
+    const weft_mat3 m = {{n, x, y, x, xx, xy, y, xy, yy}};
+    weft_mat3 inverse;
+    if (!weft_mat3_invert(&m, &inverse))
+        return 0;
+    const weft_vec3 plane = weft_mat3_apply(&inverse, (weft_vec3){z, xz, yz});
+    double least = INFINITY, most = -INFINITY;
+    for (int i = 0; i < work->n_points; i++) {
+        const double off = (double)work->bent[3 * i + 2] - plane.x - plane.y * (double)work->bent[3 * i] -
+                           plane.z * (double)work->bent[3 * i + 1];
+        least = fmin(least, off);
+        most = fmax(most, off);
+    }
+    return most - least;
+}
+
+static weft_err try_model(fit_work *work, const weft_board_view *views, int n_views, fit_model model,
+                          weft_lens_report *r, weft_error *err)
+{
+    double *const to = &r->tried_px[model.bent][model.terms];
+    WEFT_TRY(held_out_error(work, views, n_views, r->n_used, model, to, err));
+    weft_explain("lens: %s, %s board: held out %.4f px", weft_lens_model_name(model.terms),
+                 model.bent ? "bent" : "flat", *to);
+    return WEFT_OK;
+}
+
+/* The simplest model that no richer one beats on views it has not seen. */
+static weft_err choose_model(fit_work *work, const weft_board_view *views, int n_views,
+                             const weft_lens_options *options, fit_model *model, weft_lens_report *r,
+                             weft_error *err)
+{
+    const bool can_choose = r->n_used > WEFT_LENS_MIN_VIEWS;
+    *model = (fit_model){options->model == WEFT_LENS_AUTO ? WEFT_LENS_K1K2P1P2 : options->model,
+                         options->bent == 1};
+    WEFT_TRY(try_model(work, views, n_views, *model, r, err));
+    for (int m = 1; m < WEFT_LENS_N_MODELS && options->model == WEFT_LENS_AUTO && can_choose; m++) {
+        const fit_model richer = {(weft_lens_model_choice)m, model->bent};
+        WEFT_TRY(try_model(work, views, n_views, richer, r, err));
+        if (r->tried_px[richer.bent][m] < RICHER_GAIN * r->tried_px[model->bent][model->terms])
+            *model = richer;
+    }
+    if (options->bent < 0 && can_choose) {
+        const fit_model bent = {model->terms, true};
+        WEFT_TRY(try_model(work, views, n_views, bent, r, err));
+        model->bent = r->tried_px[1][bent.terms] < BENT_GAIN * r->tried_px[0][bent.terms];
+    }
+    r->model = model->terms;
+    r->bent = model->bent;
+    r->held_out_px = r->tried_px[model->bent][model->terms];
+    return WEFT_OK;
+}
+
+static void keep_residuals(const fit_work *work, weft_board_view *views, int n_used)
+{
+    const size_t n = 2 * (size_t)work->n_points;
+    for (int i = 0; i < n_used; i++) {
+        weft_board_view *const view = &views[work->packed[i]];
+        view->rms_px = work->per_view[i];
+        if (view->residuals)
+            memcpy(view->residuals, work->residuals + n * (size_t)i, n * sizeof(float));
+    }
 }
 
 static weft_err check_estimate(const weft_lens_estimate *e, weft_error *err)
@@ -214,35 +339,60 @@ static weft_err check_estimate(const weft_lens_estimate *e, weft_error *err)
     return WEFT_OK;
 }
 
-weft_err weft_lens_fit(const weft_board *board, int width, int height, weft_board_view *views, int n_views,
-                       weft_camera *camera, weft_lens_report *report, weft_error *err)
+static void fill_camera(const fit_work *work, const weft_lens_estimate *e, weft_camera *camera)
 {
-    fit_work work = {.n_points = board->columns * board->rows, .width = width, .height = height};
+    *camera = (weft_camera){.width = work->width,
+                            .height = work->height,
+                            .fx = e->camera[0],
+                            .fy = e->camera[1],
+                            .cx = e->camera[2],
+                            .cy = e->camera[3],
+                            .rms_px = e->rms_px};
+    memcpy(camera->distortion, e->distortion, sizeof e->distortion);
+}
+
+static weft_err fit_lens(fit_work *work, weft_board_view *views, int n_views,
+                         const weft_lens_options *options, weft_lens_estimate *e, weft_lens_report *r,
+                         weft_error *err)
+{
+    fit_model model = {options->model == WEFT_LENS_AUTO ? WEFT_LENS_K1K2P1P2 : options->model,
+                       options->bent == 1};
+    leave_out_blurred(work, views, n_views);
+    WEFT_TRY(fit_without_outliers(work, views, n_views, model, e, &r->n_used, err));
+    WEFT_TRY(check_estimate(e, err));
+    WEFT_TRY(choose_model(work, views, n_views, options, &model, r, err));
+    WEFT_TRY(fit_views(work, views, n_views, -1, model, e, &r->n_used, err));
+    WEFT_TRY(check_estimate(e, err));
+    keep_residuals(work, views, r->n_used);
+    r->bend_mm = model.bent ? bend_of(work) : 0;
+    fill_coverage(work, views, n_views, r);
+    memcpy(r->sigma, e->sigma, sizeof r->sigma);
+    return WEFT_OK;
+}
+
+weft_err weft_lens_fit(const weft_board *board, int width, int height, weft_board_view *views, int n_views,
+                       const weft_lens_options *options, weft_camera *camera, weft_lens_report *report,
+                       weft_error *err)
+{
+    static const weft_lens_options automatic = {WEFT_LENS_AUTO, -1};
+    fit_work work = {.n_points = board->columns * board->rows,
+                     .columns = board->columns,
+                     .width = width,
+                     .height = height};
     weft_lens_estimate e;
     weft_lens_report r = {0};
     WEFT_TRY(weft_board_check(board, err));
     WEFT_TRY(weft_lens_opencv_load(&work.opencv, err));
-    for (int i = 0; i < n_views; i++)
+    for (int i = 0; i < n_views; i++) {
         views[i].used = true;
+        views[i].blurred = false;
+    }
     weft_err status = work_init(&work, board, n_views, err);
     if (status == WEFT_OK)
-        status = fit_without_outliers(&work, views, n_views, &e, &r.n_used, err);
-    if (status == WEFT_OK)
-        status = check_estimate(&e, err);
-    if (status == WEFT_OK)
-        status = held_out_error(&work, views, n_views, r.n_used, &r.held_out_px, err);
+        status = fit_lens(&work, views, n_views, options ? options : &automatic, &e, &r, err);
     if (status == WEFT_OK) {
-        r.coverage = coverage(&work, views, n_views);
-        memcpy(r.sigma, e.sigma, sizeof r.sigma);
         *report = r;
-        *camera = (weft_camera){.width = width,
-                                .height = height,
-                                .fx = e.camera[0],
-                                .fy = e.camera[1],
-                                .cx = e.camera[2],
-                                .cy = e.camera[3],
-                                .rms_px = e.rms_px};
-        memcpy(camera->distortion, e.distortion, sizeof e.distortion);
+        fill_camera(&work, &e, camera);
     }
     work_fini(&work);
     return status;

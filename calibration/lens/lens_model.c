@@ -1,27 +1,37 @@
 #include "calibration/lens/lens_model.h"
 
-void weft_lens_distort(const double distortion[5], double x, double y, double *xd, double *yd)
+/* (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) and its derivative by r2. */
+static double radial_at(const double d[WEFT_DISTORTION], double r2, double *slope)
 {
-    const double k1 = distortion[0], k2 = distortion[1], p1 = distortion[2], p2 = distortion[3],
-                 k3 = distortion[4];
-    const double r2 = x * x + y * y, radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double over = 1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+    const double under = 1 + r2 * (d[5] + r2 * (d[6] + r2 * d[7]));
+    const double over_slope = d[0] + r2 * (2 * d[1] + r2 * 3 * d[4]);
+    const double under_slope = d[5] + r2 * (2 * d[6] + r2 * 3 * d[7]);
+    *slope = (over_slope - over / under * under_slope) / under;
+    return over / under;
+}
+
+void weft_lens_distort(const double distortion[WEFT_DISTORTION], double x, double y, double *xd, double *yd)
+{
+    const double p1 = distortion[2], p2 = distortion[3], r2 = x * x + y * y;
+    double unused;
+    const double radial = radial_at(distortion, r2, &unused);
     *xd = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
     *yd = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
 }
 
 /* Derivatives of weft_lens_distort(): [dxd/dx, dxd/dy, dyd/dy]; the matrix is symmetric. */
-static void distort_jacobian(const double distortion[5], double x, double y, double j[3])
+static void distort_jacobian(const double distortion[WEFT_DISTORTION], double x, double y, double j[3])
 {
-    const double k1 = distortion[0], k2 = distortion[1], p1 = distortion[2], p2 = distortion[3],
-                 k3 = distortion[4];
-    const double r2 = x * x + y * y, radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3)); /* d radial / d r2, times 2 */
-    j[0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x;
-    j[1] = x * y * slope + 2 * p1 * x + 2 * p2 * y;
-    j[2] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x;
+    const double p1 = distortion[2], p2 = distortion[3];
+    double slope;
+    const double radial = radial_at(distortion, x * x + y * y, &slope);
+    j[0] = radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x;
+    j[1] = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y;
+    j[2] = radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x;
 }
 
-bool weft_lens_undistort(const double distortion[5], double xd, double yd, double *x, double *y)
+bool weft_lens_undistort(const double distortion[WEFT_DISTORTION], double xd, double yd, double *x, double *y)
 {
     double px = xd, py = yd, ex, ey, j[3];
     for (int i = 0; i < 50; i++) {

@@ -1,14 +1,16 @@
-/** The camera as a map between the world and the picture (OpenCV's model: k1, k2, p1, p2, k3). */
+/** The camera as a map between the world and the picture (OpenCV's models: k1, k2, p1, p2, k3, and the
+ * rational one with k4, k5, k6 below the line). */
 #ifndef WEFT_CALIBRATION_LENS_LENS_MODEL_H
 #define WEFT_CALIBRATION_LENS_LENS_MODEL_H
 
 #include "calibration/calibration.h"
 
 /** Distorts normalised coordinates (x_c / z_c, y_c / z_c). */
-void weft_lens_distort(const double distortion[5], double x, double y, double *xd, double *yd);
+void weft_lens_distort(const double distortion[WEFT_DISTORTION], double x, double y, double *xd, double *yd);
 
 /** Inverse of weft_lens_distort() by Newton's method, to 1e-12; false where the model folds over. */
-bool weft_lens_undistort(const double distortion[5], double xd, double yd, double *x, double *y);
+bool weft_lens_undistort(const double distortion[WEFT_DISTORTION], double xd, double yd, double *x,
+                         double *y);
 
 /** World point (mm) to pixel.  False when it is behind the camera. */
 bool weft_camera_project(const weft_camera *camera, weft_vec3 world, double *u, double *v);

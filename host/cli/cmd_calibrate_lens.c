@@ -5,7 +5,6 @@
 #include "calibration/lens/lens_fit.h"
 #include "calibration/lens/lens_model.h"
 #include "calibration/lens/lens_module.h"
-#include "calibration/lens/lens_residuals.h"
 #include "core/json.h"
 #include "core/log.h"
 #include "core/mem.h"
@@ -15,11 +14,14 @@
 #include <math.h>
 #include <string.h>
 
+#define BLUR_MOST 0.3 /* width of an edge over a square's */
+
 typedef struct lens_args {
     const char *output, *on_table;
     weft_size board;
     double square_mm;
     weft_numbers origin_mm;
+    const char *model, *bent;
 } lens_args;
 
 static const weft_field fields[] = {
@@ -55,6 +57,19 @@ static const weft_field fields[] = {
      .unit = "X,Y",
      .def = "0,0",
      .help = "where the middle of that board is in the world"},
+    {.key = "model",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lens_args, model),
+     .unit = "NAME",
+     .def = "auto",
+     .help =
+         "coefficients of the lens: k1k2p1p2, k1k2p1p2k3, rational; auto takes the held-out error's word"},
+    {.key = "bent",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lens_args, bent),
+     .unit = "WORD",
+     .def = "auto",
+     .help = "whether the board may be bent: yes, no; auto takes the held-out error's word"},
     {0},
 };
 
@@ -67,6 +82,8 @@ typedef struct lens_run {
     const char *first_name; /* of the picture that gave them */
     weft_board_view *views; /* [n_views] */
     int n_views;
+    weft_lens_options options;
+    float *residuals;      /* [operands][corners][2] */
     float *corners;        /* [operands + 1][corners][2]; the last is the board on the table */
     json_t *without_board; /* names of pictures without a board */
     weft_lens_report lens;
@@ -93,7 +110,24 @@ static weft_err check_size(lens_run *run, const weft_board_picture *picture, con
                      name, picture->width, picture->height, run->first_name, run->width, run->height);
 }
 
-static weft_err find_board(lens_run *run, const char *path, float *corners, bool *found, weft_error *err)
+/* The widest edge is `edge_px`; a picture in which corners have lost their place is refused. */
+static weft_err check_sharp(const lens_run *run, const weft_board_picture *picture, const float *corners,
+                            double *edge_px, weft_error *err)
+{
+    double share;
+    *edge_px =
+        weft_board_edge_width(picture->grey, picture->width, picture->height, &run->board, corners, &share);
+    if (share > BLUR_MOST)
+        return weft_fail(
+            err, WEFT_ERR_NODATA,
+            "the board is blurred: its edges are %.0f px wide, %.0f %% of a square (%.0f %% at most); focus, "
+            "and hold it still",
+            *edge_px, 100 * share, 100 * BLUR_MOST);
+    return WEFT_OK;
+}
+
+static weft_err find_board(lens_run *run, const char *path, float *corners, bool *found, double *edge_px,
+                           weft_error *err)
 {
     weft_board_picture picture;
     WEFT_TRY(weft_board_picture_load(path, &picture, err));
@@ -101,6 +135,8 @@ static weft_err find_board(lens_run *run, const char *path, float *corners, bool
     if (status == WEFT_OK) {
         status =
             weft_board_find(picture.grey, picture.width, picture.height, &run->board, corners, found, err);
+        if (status == WEFT_OK && *found)
+            status = check_sharp(run, &picture, corners, edge_px, err);
         if (status != WEFT_OK)
             weft_prefix(err, status, "%s", path);
     }
@@ -115,10 +151,13 @@ static weft_err find_boards(const weft_invocation *inv, lens_run *run, weft_erro
     weft_err status = WEFT_OK;
     for (int i = 0; i < inv->n_operands && status == WEFT_OK; i++) {
         bool found = false;
+        double edge_px = 0;
         float *const corners = corners_of(run, run->n_views);
-        status = find_board(run, inv->operands[i], corners, &found, err);
+        float *const residuals = run->residuals + (corners - run->corners);
+        status = find_board(run, inv->operands[i], corners, &found, &edge_px, err);
         if (status == WEFT_OK && found)
-            run->views[run->n_views++] = (weft_board_view){.name = inv->operands[i], .corners = corners};
+            run->views[run->n_views++] = (weft_board_view){
+                .name = inv->operands[i], .corners = corners, .edge_px = edge_px, .residuals = residuals};
         else if (status == WEFT_OK) {
             weft_warn("%s: no board of %dx%d inner corners in it; left out", inv->operands[i],
                       run->board.columns, run->board.rows);
@@ -134,7 +173,10 @@ static weft_err find_boards(const weft_invocation *inv, lens_run *run, weft_erro
 static void warn_of_weak_views(const lens_run *run)
 {
     for (int i = 0; i < run->n_views; i++)
-        if (!run->views[i].used)
+        if (run->views[i].blurred)
+            weft_warn("%s: left out: blurred, its edges are %.1f px wide; was it in focus, and still?",
+                      run->views[i].name, run->views[i].edge_px);
+        else if (!run->views[i].used)
             weft_warn(
                 "%s: left out: its corners are off by %.2f px where the others fit; was the board bent, or "
                 "moved?",
@@ -149,8 +191,8 @@ static void warn_of_weak_views(const lens_run *run)
 static weft_err fit_lens(lens_run *run, weft_error *err)
 {
     const bool had_lights = run->cal.has_lights, had_pose = run->cal.has_camera && run->cal.camera.has_pose;
-    WEFT_TRY(weft_lens_fit(&run->board, run->width, run->height, run->views, run->n_views, &run->cal.camera,
-                           &run->lens, err));
+    WEFT_TRY(weft_lens_fit(&run->board, run->width, run->height, run->views, run->n_views, &run->options,
+                           &run->cal.camera, &run->lens, err));
     run->cal.has_camera = true;
     warn_of_weak_views(run);
     if (had_pose && !run->args->on_table)
@@ -166,7 +208,8 @@ static weft_err fit_pose(lens_run *run, weft_error *err)
     const char *const path = run->args->on_table;
     const weft_board_view view = {.name = path, .corners = corners_of(run, run->n_views)};
     bool found = false;
-    WEFT_TRY(find_board(run, path, view.corners, &found, err));
+    double edge_px = 0;
+    WEFT_TRY(find_board(run, path, view.corners, &found, &edge_px, err));
     if (!found)
         return weft_fail(
             err, WEFT_ERR_NODATA,
@@ -183,20 +226,52 @@ static json_t *board_json(const weft_board *board)
                      board->square_mm);
 }
 
-/* Four numbers a corner (u, v, du, dv), to a hundredth of a pixel; NULL when there is nothing to show. */
-static json_t *residuals_json(const lens_run *run, const weft_board_view *view)
+static json_t *view_json(const lens_run *run, const weft_board_view *view)
 {
-    const int n = 4 * run->board.columns * run->board.rows;
-    double *const residuals = view->used ? weft_alloc((size_t)n, sizeof *residuals, NULL) : NULL;
-    json_t *numbers = NULL;
-    if (residuals &&
-        weft_lens_view_residuals(&run->board, view, &run->cal.camera, residuals, NULL) == WEFT_OK) {
-        for (int i = 0; i < n; i++) /* the place to a pixel, the residual to a thousandth */
-            residuals[i] = i % 4 < 2 ? round(residuals[i]) : round(1000 * residuals[i]) / 1000;
-        numbers = weft_json_numbers(residuals, n);
+    json_t *const one = json_pack("{s:s, s:f, s:b, s:f}", "image", view->name, "rms_px", view->rms_px, "used",
+                                  (int)view->used, "edge_px", view->edge_px);
+    if (one && !view->used)
+        json_object_set_new(one, "left_out",
+                            json_string(view->blurred ? "blurred" : "contradicts the others"));
+    const int n = run->board.columns * run->board.rows;
+    json_t *const numbers = json_array();
+    for (int i = 0; view->used && i < n; i++) { /* the place to a pixel, the residual to a thousandth */
+        const float *const at = view->corners + 2 * (size_t)i, *const off = view->residuals + 2 * (size_t)i;
+        for (int k = 0; k < 2; k++)
+            json_array_append_new(numbers, json_real(round((double)at[k])));
+        for (int k = 0; k < 2; k++)
+            json_array_append_new(numbers, json_real(round(1000 * (double)off[k]) / 1000));
     }
-    weft_free(residuals);
-    return numbers;
+    if (view->used)
+        json_object_set_new(one, "corners", numbers);
+    else
+        json_decref(numbers);
+    return one;
+}
+
+/* The held-out errors that the choice was made by. */
+static json_t *tried_json(const weft_lens_report *lens)
+{
+    json_t *const tried = json_array();
+    for (int bent = 0; bent < 2; bent++)
+        for (int m = 0; m < WEFT_LENS_N_MODELS; m++)
+            if (lens->tried_px[bent][m] > 0)
+                json_array_append_new(tried, json_pack("{s:s, s:b, s:f}", "model",
+                                                       weft_lens_model_name((weft_lens_model_choice)m),
+                                                       "bent", bent, "held_out_px", lens->tried_px[bent][m]));
+    return tried;
+}
+
+static json_t *coverage_json(const weft_lens_report *lens)
+{
+    json_t *const map = json_array();
+    for (int r = 0; r < WEFT_COVERAGE_ROWS; r++) {
+        json_t *const row = json_array();
+        for (int c = 0; c < WEFT_COVERAGE_COLUMNS; c++)
+            json_array_append_new(row, json_integer(lens->map[r][c]));
+        json_array_append_new(map, row);
+    }
+    return map;
 }
 
 static json_t *lens_json(const lens_run *run)
@@ -205,14 +280,23 @@ static json_t *lens_json(const lens_run *run)
     const weft_lens_opencv *opencv;
     json_t *const views = json_array();
     for (int i = 0; i < run->n_views; i++)
-        json_array_append_new(views, json_pack("{s:s, s:f, s:b, s:o*}", "image", run->views[i].name, "rms_px",
-                                               run->views[i].rms_px, "used", (int)run->views[i].used,
-                                               "corners", residuals_json(run, &run->views[i])));
-    json_t *const report = json_pack(
-        "{s:f, s:f, s:i, s:f, s:o, s:{s:f, s:f, s:f, s:f, s:o}, s:o, s:O}", "rms_px", run->cal.camera.rms_px,
-        "held_out_px", run->lens.held_out_px, "views_used", run->lens.n_used, "coverage", run->lens.coverage,
-        "board", board_json(&run->board), "sigma", "fx", s[0], "fy", s[1], "cx", s[2], "cy", s[3],
-        "distortion", weft_json_numbers(s + 4, 4), "views", views, "without_board", run->without_board);
+        json_array_append_new(views, view_json(run, &run->views[i]));
+    json_t *const report =
+        json_pack("{s:f, s:f, s:i, s:f, s:o, s:{s:f, s:f, s:f, s:f, s:o}, s:o, s:O}", "rms_px",
+                  run->cal.camera.rms_px, "held_out_px", run->lens.held_out_px, "views_used",
+                  run->lens.n_used, "coverage", run->lens.coverage, "board", board_json(&run->board), "sigma",
+                  "fx", s[0], "fy", s[1], "cx", s[2], "cy", s[3], "distortion",
+                  weft_json_numbers(s + 4, run->lens.model == WEFT_LENS_K1K2P1P2 ? 4
+                                           : run->lens.model == WEFT_LENS_K3     ? 5
+                                                                                 : 8),
+                  "views", views, "without_board", run->without_board);
+    if (report) {
+        json_object_set_new(report, "model", json_string(weft_lens_model_name(run->lens.model)));
+        json_object_set_new(report, "board_bent", json_boolean(run->lens.bent));
+        json_object_set_new(report, "board_bend_mm", json_real(run->lens.bend_mm));
+        json_object_set_new(report, "tried", tried_json(&run->lens));
+        json_object_set_new(report, "coverage_map", coverage_json(&run->lens));
+    }
     if (report && weft_lens_opencv_load(&opencv, NULL) == WEFT_OK)
         json_object_set_new(report, "opencv", json_string(opencv->version));
     return report;
@@ -238,8 +322,12 @@ static weft_err print_result(const weft_invocation *inv, const lens_run *run, we
     }
     if (inv->n_operands > 0) {
         const double *const s = run->lens.sigma;
-        fprintf(inv->out, "%d views, rms %.3f px (held out %.3f px)\n", run->lens.n_used, c->rms_px,
-                run->lens.held_out_px);
+        fprintf(inv->out, "%d views, rms %.3f px (held out %.3f px), model %s, %s board", run->lens.n_used,
+                c->rms_px, run->lens.held_out_px, weft_lens_model_name(run->lens.model),
+                run->lens.bent ? "bent" : "flat");
+        if (run->lens.bent)
+            fprintf(inv->out, " (by %.2f mm)", run->lens.bend_mm);
+        fputc('\n', inv->out);
         fprintf(inv->out, "fx %.2f +- %.2f, fy %.2f +- %.2f, cx %.2f +- %.2f, cy %.2f +- %.2f px\n", c->fx,
                 s[0], c->fy, s[1], c->cx, s[2], c->cy, s[3]);
         fprintf(inv->out, "k1 %.5f +- %.5f, k2 %.5f +- %.5f, p1 %.6f +- %.6f, p2 %.6f +- %.6f\n",
@@ -252,9 +340,29 @@ static weft_err print_result(const weft_invocation *inv, const lens_run *run, we
     return WEFT_OK;
 }
 
-static weft_err check_args(const weft_invocation *inv, const lens_run *run, weft_error *err)
+static weft_err choose_options(lens_run *run, weft_error *err)
+{
+    static const char *const words[] = {"no", "yes", "auto"};
+    int model = WEFT_LENS_N_MODELS, bent = 3;
+    for (int m = WEFT_LENS_AUTO; m < WEFT_LENS_N_MODELS; m++)
+        if (strcmp(run->args->model, weft_lens_model_name((weft_lens_model_choice)m)) == 0)
+            model = m;
+    for (int k = 0; k < 3; k++)
+        if (strcmp(run->args->bent, words[k]) == 0)
+            bent = k;
+    if (model == WEFT_LENS_N_MODELS)
+        return weft_fail(err, WEFT_ERR_USAGE, "--model %s: there are auto, k1k2p1p2, k1k2p1p2k3 and rational",
+                         run->args->model);
+    if (bent == 3)
+        return weft_fail(err, WEFT_ERR_USAGE, "--bent %s: wanted auto, yes or no", run->args->bent);
+    run->options = (weft_lens_options){(weft_lens_model_choice)model, bent == 2 ? -1 : bent};
+    return WEFT_OK;
+}
+
+static weft_err check_args(const weft_invocation *inv, lens_run *run, weft_error *err)
 {
     const lens_args *const args = run->args;
+    WEFT_TRY(choose_options(run, err));
     WEFT_TRY(weft_board_check(&run->board, err));
     if (inv->n_operands == 0 && !args->on_table)
         return weft_fail(err, WEFT_ERR_USAGE, "pictures of the board are missing");
@@ -274,8 +382,9 @@ static weft_err alloc_run(lens_run *run, int n, weft_error *err)
     const size_t corners = (size_t)run->board.columns * (size_t)run->board.rows;
     run->views = weft_alloc((size_t)n, sizeof *run->views, err);
     run->corners = weft_alloc(2 * corners * (size_t)(n + 1), sizeof *run->corners, err);
+    run->residuals = weft_alloc(2 * corners * (size_t)(n + 1), sizeof *run->residuals, err);
     run->without_board = json_array();
-    if (!run->views || !run->corners)
+    if (!run->views || !run->corners || !run->residuals)
         return WEFT_ERR_NOMEM;
     return run->without_board ? WEFT_OK : weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
 }
@@ -309,6 +418,7 @@ static weft_err run_lens(const weft_invocation *inv, const void *args, weft_erro
     json_decref(run.without_board);
     weft_free(run.views);
     weft_free(run.corners);
+    weft_free(run.residuals);
     weft_calibration_fini(&run.cal);
     return status;
 }

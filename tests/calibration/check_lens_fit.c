@@ -67,7 +67,8 @@ static void test_real_photographs(void **state)
     load_photographs(&all);
     weft_camera camera;
     weft_lens_report report;
-    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, &camera, &report, err));
+    static const weft_lens_options flat = {WEFT_LENS_AUTO, 0};
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, &flat, &camera, &report, err));
     print_message(
         "13 photographs: rms %.4f px, held out %.4f px, fx %.2f +- %.2f, cx %.2f, cy %.2f, k1 %.4f\n",
         camera.rms_px, report.held_out_px, camera.fx, report.sigma[0], camera.cx, camera.cy,
@@ -85,6 +86,100 @@ static void test_real_photographs(void **state)
     assert_near(report.sigma[0], 0.55, 0.1);
     assert_true(report.coverage > 0.6 && report.coverage < 1);
     assert_false(camera.has_pose);
+    assert_int_equal(report.model, WEFT_LENS_K1K2P1P2); /* more coefficients predict no better */
+    assert_near(report.tried_px[0][WEFT_LENS_K3], 0.1829, 0.001);
+    assert_near(report.tried_px[0][WEFT_LENS_RATIONAL], 0.1846, 0.001);
+    int corners = 0;
+    for (int r = 0; r < WEFT_COVERAGE_ROWS; r++)
+        for (int c = 0; c < WEFT_COVERAGE_COLUMNS; c++)
+            corners += report.map[r][c];
+    assert_int_equal(corners, 13 * CORNERS);
+}
+
+/* The board of these pictures is bent by half a millimetre: what the other program finds too. */
+static void test_the_bent_board_of_the_photographs(void **state)
+{
+    (void)state;
+    need_module();
+    static float residuals[MAX_VIEWS][2 * CORNERS];
+    views all = {0};
+    load_photographs(&all);
+    for (int i = 0; i < all.n; i++)
+        all.views[i].residuals = residuals[i];
+    const weft_board large = {9, 6, 25};
+    weft_camera camera;
+    weft_lens_report report;
+    assert_ok(weft_lens_fit(&large, 640, 480, all.views, all.n, NULL, &camera, &report, err));
+    print_message("bent: rms %.4f px, held out %.4f px, fx %.2f, bend %.2f mm\n", camera.rms_px,
+                  report.held_out_px, camera.fx, report.bend_mm);
+    assert_true(report.bent);
+    assert_near(camera.rms_px, 0.1045, 0.002);
+    assert_near(report.held_out_px, 0.1224, 0.002);
+    assert_near(camera.fx, 533.97, 0.3);
+    assert_near(camera.cy, 238.8, 0.3);
+    assert_true(report.bend_mm > 0.3 && report.bend_mm < 0.9);
+    double sum = 0;
+    for (int i = 0; i < all.n; i++)
+        for (int k = 0; k < 2 * CORNERS; k++)
+            sum += (double)residuals[i][k] * (double)residuals[i][k];
+    assert_near(sqrt(sum / (all.n * CORNERS)), camera.rms_px, 1e-3);
+}
+
+static void test_a_blurred_view_is_left_out(void **state)
+{
+    (void)state;
+    need_module();
+    views all = {0};
+    load_photographs(&all);
+    for (int i = 0; i < all.n; i++)
+        all.views[i].edge_px = i == 6 ? 9 : 2.5;
+    weft_camera camera;
+    weft_lens_report report;
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err));
+    assert_int_equal(report.n_used, 12);
+    assert_true(all.views[6].blurred && !all.views[6].used && !all.views[5].blurred);
+}
+
+/* A lens that only the rational model describes: twelve views by OpenCV's own projection. */
+static void test_a_rational_lens_is_recognised(void **state)
+{
+    (void)state;
+    need_module();
+    static const double distortion[8] = {0.9, 0.3, 1e-3, -5e-4, 0.02, 1.25, 0.55, 0.05};
+    static const double camera_matrix[4] = {420, 421, 325, 236};
+    views all = {0};
+    uint64_t seed = 4;
+    double world[CORNERS][3] = {{0}}, seen[CORNERS][2];
+    for (int i = 0; i < CORNERS; i++) {
+        world[i][0] = 10 * (i % 9 - 4);
+        world[i][1] = 10 * (2.5 - (double)(i / 9));
+    }
+    for (int v = 0; v < 14; v++) {
+        const double a = 3.14159 + 0.6 * (weft_test_random(&seed) - 0.5) + (v % 2 ? 0.3 : -0.3),
+                     b = 0.6 * (weft_test_random(&seed) - 0.5) + (v % 4 < 2 ? 0.3 : -0.3);
+        const weft_mat3 x = {{1, 0, 0, 0, cos(a), -sin(a), 0, sin(a), cos(a)}},
+                        y = {{cos(b), 0, sin(b), 0, 1, 0, -sin(b), 0, cos(b)}};
+        const weft_mat3 r = weft_mat3_multiply(&x, &y);
+        const double t[3] = {50 * (v % 3 - 1), 35 * (v / 3 % 3 - 1), 85};
+        assert_int_equal(oracle_project(r.m, t, camera_matrix, distortion, CORNERS, *world, *seen), 0);
+        for (int i = 0; i < 2 * CORNERS; i++)
+            all.corners[v][i] = (float)(seen[i / 2][i % 2] + 0.05 * weft_test_gauss(&seed));
+        add_name(&all);
+    }
+    weft_camera camera;
+    weft_lens_report report;
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err));
+    print_message("rational lens: held out %.3f, %.3f, %.3f px; fx %.2f +- %.2f\n", report.tried_px[0][0],
+                  report.tried_px[0][1], report.tried_px[0][2], camera.fx, report.sigma[0]);
+    assert_int_equal(report.model, WEFT_LENS_RATIONAL);
+    assert_true(report.held_out_px < 0.09);
+    assert_true(fabs(camera.fx - 420) < 4 * report.sigma[0] + 0.1);
+    for (double w = -250; w <= 250; w += 50) { /* in the field, the lens is what it was made as */
+        double px, py, qx, qy;
+        weft_lens_distort(camera.distortion, w / 420, w / 700, &px, &py);
+        weft_lens_distort(distortion, w / 420, w / 700, &qx, &qy);
+        assert_near(camera.fx * px + camera.cx, 420 * qx + 325, 0.6);
+    }
 }
 
 static void test_a_wrong_view_is_left_out(void **state)
@@ -97,7 +192,7 @@ static void test_a_wrong_view_is_left_out(void **state)
         all.corners[4][2 * i] += 4.0F * (float)((i % 9 - 4) * (i % 9 - 4)) / 16;
     weft_camera camera;
     weft_lens_report report;
-    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, &camera, &report, err));
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err));
     assert_int_equal(report.n_used, 12);
     for (int i = 0; i < all.n; i++)
         assert_int_equal(all.views[i].used, i != 4);
@@ -113,12 +208,12 @@ static void test_views_that_do_not_determine_a_lens(void **state)
     load_photographs(&all);
     weft_camera camera = {.width = 7};
     weft_lens_report report;
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, 4, &camera, &report, err), WEFT_ERR_NODATA,
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, 4, NULL, &camera, &report, err), WEFT_ERR_NODATA,
                  "4 views of the board; wanted 5 or more");
     for (int i = 1; i < all.n; i++) /* one picture thirteen times */
         memcpy(all.corners[i], all.corners[0], sizeof all.corners[0]);
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, &camera, &report, err), WEFT_ERR_NODATA,
-                 "tilt the board");
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err),
+                 WEFT_ERR_NODATA, "tilt the board");
     assert_int_equal(camera.width, 7);
 }
 
@@ -134,8 +229,8 @@ static void test_outliers_that_are_too_many_are_named(void **state)
             all.corners[v][i] += (float)(20 * (1 + v) * weft_test_gauss(&seed));
     weft_camera camera;
     weft_lens_report report;
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, &camera, &report, err), WEFT_ERR_NODATA,
-                 "contradict the others (view-");
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err),
+                 WEFT_ERR_NODATA, "contradict the others (view-");
 }
 
 /* A camera 600 mm over the table as the scanner has it, tilted by 3 degrees. */
@@ -280,10 +375,47 @@ static void test_corners_of_a_bayer_picture(void **state)
         sum += e * e / CORNERS;
         worst = fmax(worst, e);
     }
+    double share;
+    const double edge = weft_board_edge_width(grey, camera.width, camera.height, &board, found_at, &share);
+    print_message("edges of the Bayer picture: %.2f px, %.3f of a square\n", edge, share);
+    assert_true(edge > 1.8 && edge < 4.5 && share < 0.06); /* a Gaussian of 0.75 px is 1.9 */
+    for (int round = 0; round < 3; round++)                /* out of focus: a box of 25 px three times */
+        for (int v = 0; v < camera.height; v++)
+            for (int u = 0; u + 25 < camera.width; u++) {
+                int box = 0;
+                for (int k = 0; k < 25; k++)
+                    box += grey[v * camera.width + u + k];
+                grey[v * camera.width + u] = (uint8_t)(box / 25);
+            }
+    weft_board_edge_width(grey, camera.width, camera.height, &board, truth, &share);
+    assert_true(share > 0.2);
     print_message("corners of a rendered Bayer picture: rms %.4f px, worst %.4f px\n", sqrt(sum), worst);
     assert_true(sqrt(sum) < 0.04);
     assert_true(worst < 0.12);
     weft_free(grey);
+    weft_image_fini(&mosaic);
+}
+
+static void test_two_boards_are_refused(void **state)
+{
+    (void)state;
+    need_module();
+    const weft_camera camera = scanner_camera();
+    weft_image mosaic;
+    assert_ok(weft_image_init(&mosaic, camera.width, camera.height, 1, err));
+    render_board(&camera, &mosaic);
+    const size_t w = (size_t)camera.width, h = (size_t)camera.height;
+    uint8_t *const one = weft_alloc(w * h, 1, NULL), *const two = weft_alloc(2 * w * h, 1, NULL);
+    weft_board_grey(&mosaic, WEFT_CFA_RGGB, one);
+    for (size_t v = 0; v < h; v++)
+        for (size_t k = 0; k < 2; k++)
+            memcpy(two + (2 * v + k) * w, one + v * w, w);
+    float corners[2 * CORNERS];
+    bool found = false;
+    assert_fails(weft_board_find(two, 2 * camera.width, camera.height, &board, corners, &found, err),
+                 WEFT_ERR_NODATA, "there are two boards of 9x6 inner corners in it");
+    weft_free(one);
+    weft_free(two);
     weft_image_fini(&mosaic);
 }
 
@@ -309,6 +441,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_real_photographs),
+        cmocka_unit_test(test_the_bent_board_of_the_photographs),
+        cmocka_unit_test(test_a_blurred_view_is_left_out),
+        cmocka_unit_test(test_a_rational_lens_is_recognised),
+        cmocka_unit_test(test_two_boards_are_refused),
         cmocka_unit_test(test_a_wrong_view_is_left_out),
         cmocka_unit_test(test_views_that_do_not_determine_a_lens),
         cmocka_unit_test(test_outliers_that_are_too_many_are_named),

@@ -7,7 +7,7 @@
 #define N 500
 
 /* A camera 600 mm over the table, tilted and rolled; R is made from angles here, orthonormal to 1e-16. */
-static weft_camera test_camera(const double distortion[5])
+static weft_camera test_camera(const double distortion[WEFT_DISTORTION])
 {
     const double a = 3.11, b = 0.03, c = 0.02; /* about x, y, z */
     const weft_mat3 x = {{1, 0, 0, 0, cos(a), -sin(a), 0, sin(a), cos(a)}},
@@ -23,15 +23,16 @@ static weft_camera test_camera(const double distortion[5])
                           .translation = {12, -7, 604}};
     weft_mat3 xy = weft_mat3_multiply(&x, &y);
     camera.rotation = weft_mat3_multiply(&xy, &z);
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < WEFT_DISTORTION; i++)
         camera.distortion[i] = distortion[i];
     return camera;
 }
 
-static const double lenses[][5] = {{0, 0, 0, 0, 0},
-                                   {-0.29, 0.10, 0, 0, 0},
-                                   {-0.2904, 0.1021, 0.0011, -0.0004, 0},
-                                   {0.08, -0.2, -0.002, 0.003, 0.15}};
+static const double lenses[][WEFT_DISTORTION] = {{0, 0, 0, 0, 0},
+                                                 {-0.29, 0.10, 0, 0, 0},
+                                                 {-0.2904, 0.1021, 0.0011, -0.0004, 0},
+                                                 {0.08, -0.2, -0.002, 0.003, 0.15},
+                                                 {0.9, 0.3, 1e-3, -5e-4, 0.02, 1.2, 0.5, 0.05}};
 #define N_LENSES (int)(sizeof lenses / sizeof *lenses)
 
 static void test_projection_is_opencvs(void **state)
@@ -128,7 +129,7 @@ static void test_folded_lens_has_no_inverse(void **state)
 {
     (void)state;
     /* k1 = -0.5: the distorted radius has its maximum 0.5443 at r = 0.8165. */
-    const double fold[5] = {-0.5, 0, 0, 0, 0};
+    const double fold[WEFT_DISTORTION] = {-0.5, 0, 0, 0, 0};
     double x, y;
     assert_true(weft_lens_undistort(fold, 0.54, 0, &x, &y));
     assert_true(x < 0.8165);

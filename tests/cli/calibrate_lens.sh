@@ -28,7 +28,10 @@ test ! -e lens.cal
 
 # left01 lies nearly straight: it stands for a board on the table
 "$weft" calibrate lens left*.png -o lens.cal --square-mm 25 --board-on-table left01.png \
-    --board-origin-mm 10,-5 --json -q >report.json
+    --board-origin-mm 10,-5 --bent no --json -q >report.json
+"$weft" calibrate lens left*.png -o bent.cal --square-mm 25 --json -q >bent.json
+expect 2 '--model' "$weft" calibrate lens left*.png -o other.cal --model k9
+expect 2 '--bent' "$weft" calibrate lens left*.png -o other.cal --bent maybe
 expect 1 '--force' "$weft" calibrate lens left*.png -o lens.cal --square-mm 25
 expect 1 'has a pose already' "$weft" calibrate lens -o lens.cal --board-on-table left01.png
 expect 0 'pose: camera' "$weft" calibrate lens -o lens.cal --square-mm 25 --board-on-table left01.png --force
@@ -40,6 +43,12 @@ print("rms %.4f held out %.4f fx %.2f pose %.3f" % (lens["rms_px"], lens["held_o
 assert abs(lens["rms_px"] - 0.1774) < 0.003 and abs(lens["held_out_px"] - 0.1826) < 0.003
 assert abs(cam["fx"] - 533.35) < 0.55 and (cam["width"], cam["height"]) == (640, 480)
 assert len(lens["views"]) == 13 and lens["views_used"] == 13 and lens["opencv"]
+bent = json.load(open("bent.json"))["lens"]
+print("bent board: rms %.4f held out %.4f bend %.2f mm" % (bent["rms_px"], bent["held_out_px"], bent["board_bend_mm"]))
+assert bent["board_bent"] and bent["rms_px"] < 0.12 and bent["held_out_px"] < 0.14 and bent["model"] == "k1k2p1p2"
+assert abs(json.load(open("bent.cal/calibration.json"))["camera"]["fx"] - 533.35) < 2
+assert not lens["board_bent"] and len(lens["tried"]) == 3 and sum(map(sum, lens["coverage_map"])) == 13 * 54
+assert all(len(v["corners"]) == 4 * 54 and 1 < v["edge_px"] < 6 for v in lens["views"])
 assert r["pose"]["rms_px"] < 0.6 and r["pose"]["board_origin_mm"] == [10, -5]
 R = cam["rotation"]
 up, towards = R[3:6], R[6:9]
