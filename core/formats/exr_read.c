@@ -20,7 +20,7 @@ typedef struct exr_reader {
     uint64_t size; /* of the file, bytes */
     exr_context_t context;
     weft_exr_failure failure;
-    int part;
+    int part, level; /* level: of mips */
     exr_storage_t storage;
     exr_attr_box2i_t window;
     int width, height;
@@ -116,6 +116,32 @@ static weft_err choose_part(exr_reader *r, const char *const *names, int n, weft
     return missing_channel(r, lacking, err);
 }
 
+static int count_levels(const exr_reader *r)
+{
+    int across = 1, down = 1;
+    if (r->storage == EXR_STORAGE_TILED &&
+        exr_get_tile_levels(r->context, r->part, &across, &down) != EXR_ERR_SUCCESS)
+        return 1;
+    return across < down ? across : down;
+}
+
+/* A smaller level in place of the whole picture. */
+static weft_err choose_level(exr_reader *r, weft_error *err)
+{
+    const int levels = count_levels(r);
+    int32_t width, height;
+    if (r->level >= levels)
+        return weft_fail(err, WEFT_ERR_MISSING, "%s: has no level %d of mips (it has %d)", r->path, r->level,
+                         levels);
+    if (exr_get_level_sizes(r->context, r->part, r->level, r->level, &width, &height) != EXR_ERR_SUCCESS ||
+        width < 1 || height < 1 || width > r->width || height > r->height)
+        return weft_fail(err, WEFT_ERR_FORMAT, "%s: is a damaged EXR: level %d has no size", r->path,
+                         r->level);
+    r->width = width;
+    r->height = height;
+    return WEFT_OK;
+}
+
 static weft_err read_layout(exr_reader *r, weft_error *err)
 {
     exr_result_t code = exr_get_storage(r->context, r->part, &r->storage);
@@ -130,12 +156,15 @@ static weft_err read_layout(exr_reader *r, weft_error *err)
     if (width < 1 || height < 1 || width > WEFT_IMAGE_MAX_SIDE || height > WEFT_IMAGE_MAX_SIDE)
         return weft_fail(err, WEFT_ERR_FORMAT, "%s: an image of %lld x %lld pixels is not possible", r->path,
                          (long long)width, (long long)height);
-    r->width = r->tile_width = (int)width;
+    r->width = (int)width;
     r->height = (int)height;
+    if (r->level > 0)
+        WEFT_TRY(choose_level(r, err));
+    r->tile_width = r->width;
     if (r->storage == EXR_STORAGE_SCANLINE)
         code = exr_get_scanlines_per_chunk(r->context, r->part, &r->tile_height);
     else
-        code = exr_get_tile_sizes(r->context, r->part, 0, 0, &r->tile_width, &r->tile_height);
+        code = exr_get_tile_sizes(r->context, r->part, r->level, r->level, &r->tile_width, &r->tile_height);
     if (code != EXR_ERR_SUCCESS || r->tile_width < 1 || r->tile_height < 1)
         return damaged(err, r->path, &r->failure, code);
     r->n_across = (r->width + r->tile_width - 1) / r->tile_width;
@@ -159,7 +188,8 @@ static weft_err find_chunks(exr_reader *r, weft_error *err)
             r->storage == EXR_STORAGE_SCANLINE
                 ? exr_read_scanline_chunk_info(r->context, r->part, r->window.min.y + down * r->tile_height,
                                                &r->chunks[i])
-                : exr_read_tile_chunk_info(r->context, r->part, across, down, 0, 0, &r->chunks[i]);
+                : exr_read_tile_chunk_info(r->context, r->part, across, down, r->level, r->level,
+                                           &r->chunks[i]);
         if (code != EXR_ERR_SUCCESS)
             return damaged(err, r->path, &r->failure, code);
         const int w = r->width - across * r->tile_width, h = r->height - down * r->tile_height;
@@ -229,9 +259,10 @@ static void copy_repeated_planes(exr_reader *r)
             }
 }
 
-weft_err weft_exr_read(const char *path, const char *const *names, int n, weft_image *image, weft_error *err)
+weft_err weft_exr_read_level(const char *path, const char *const *names, int n, int level, weft_image *image,
+                             weft_error *err)
 {
-    exr_reader r = {.n_planes = n};
+    exr_reader r = {.n_planes = n, .level = level};
     weft_err status = open_reader(&r, path, err);
     if (status != WEFT_OK)
         goto out;
@@ -254,6 +285,23 @@ weft_err weft_exr_read(const char *path, const char *const *names, int n, weft_i
     *image = r.image;
     r.image = (weft_image){0};
 out:
+    close_reader(&r);
+    return status;
+}
+
+weft_err weft_exr_read(const char *path, const char *const *names, int n, weft_image *image, weft_error *err)
+{
+    return weft_exr_read_level(path, names, n, 0, image, err);
+}
+
+weft_err weft_exr_levels(const char *path, int *levels, weft_error *err)
+{
+    exr_reader r = {0};
+    const weft_err status = open_reader(&r, path, err);
+    if (status == WEFT_OK) {
+        exr_get_storage(r.context, 0, &r.storage);
+        *levels = count_levels(&r);
+    }
     close_reader(&r);
     return status;
 }

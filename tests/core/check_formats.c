@@ -78,6 +78,41 @@ static void test_exr_float_round_trip(void **state)
     weft_free(channels);
 }
 
+/* Every level comes back, floats exactly and halves within their step; other programs' level 0 is ours. */
+static void test_exr_mips(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"X", "Y", "Z"};
+    for (int type = 0; type < 2; type++) {
+        weft_image levels[9], back;
+        uint64_t random = 9;
+        int n = 0, count;
+        for (int w = 301, h = 140; n<9; w = w> 1 ? w / 2 : 1, h = h > 1 ? h / 2 : 1, n++) {
+            assert_ok(weft_image_init(&levels[n], w, h, 3, err));
+            for (size_t i = 0; i < 3 * weft_image_plane_size(&levels[n]); i++)
+                levels[n].data[i] = (float)weft_test_random(&random);
+        }
+        const char *const path = weft_test_path("mips.exr");
+        assert_ok(weft_exr_write_mips(path, levels, n, names, (weft_exr_type)type, err));
+        assert_ok(weft_exr_levels(path, &count, err));
+        assert_int_equal(count, n);
+        for (int level = 0; level < n; level++) {
+            assert_ok(weft_exr_read_level(path, names, 3, level, &back, err));
+            assert_int_equal(back.width, levels[level].width);
+            for (size_t i = 0; i < 3 * weft_image_plane_size(&back); i++)
+                assert_near((double)back.data[i], (double)levels[level].data[i],
+                            type == WEFT_EXR_HALF ? 2.5e-4 : 0);
+            weft_image_fini(&back);
+        }
+        assert_ok(weft_exr_read(path, names, 3, &back, err));
+        assert_int_equal(back.height, 140);
+        weft_image_fini(&back);
+        assert_fails(weft_exr_read_level(path, names, 3, 9, &back, err), WEFT_ERR_MISSING, "no level 9");
+        for (int level = 0; level < n; level++)
+            weft_image_fini(&levels[level]);
+    }
+}
+
 static void test_exr_half_and_choice_of_channels(void **state)
 {
     (void)state;
@@ -423,6 +458,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_half_is_nearest),
         cmocka_unit_test(test_exr_float_round_trip),
+        cmocka_unit_test(test_exr_mips),
         cmocka_unit_test(test_exr_half_and_choice_of_channels),
         cmocka_unit_test(test_exr_of_other_programs),
         cmocka_unit_test(test_exr_is_the_same_with_any_threads),
