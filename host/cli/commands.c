@@ -28,6 +28,7 @@ extern const weft_command weft_cmd_library_show;
 extern const weft_command weft_cmd_live;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
+extern const weft_command weft_cmd_bake;
 extern const weft_command weft_cmd_preview;
 
 /* In the order of the help: the way of the data, from the lights to the picture.  One a line. */
@@ -54,6 +55,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_compare,
+    &weft_cmd_bake,
     &weft_cmd_preview,
     &weft_cmd_contact,
     &weft_cmd_brdf,

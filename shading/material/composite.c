@@ -46,11 +46,15 @@ typedef struct compositor {
     bool periodic;
 } compositor;
 
-/* Set by a text, not by the defaults of the type. */
-static const weft_rad_member *set(const weft_rad_record *record, const char *name)
+/* The property, unless it comes from `inherited` or from what that derives from; NULL: whoever set it. */
+static const weft_rad_member *own(const weft_rad_record *record, const char *name,
+                                  const weft_asset *inherited)
 {
     const weft_rad_member *const m = weft_rad_at(record, name);
-    return m && m->set_by && !weft_material_type_find(m->set_by) ? m : NULL;
+    for (const weft_asset *a = inherited; m && a; a = a->base)
+        if (strcmp(m->set_by, a->name) == 0)
+            return NULL;
+    return m;
 }
 
 static weft_err scan_path(const weft_rad_member *scan, char **path, weft_error *err)
@@ -290,7 +294,7 @@ static void steepen(weft_baked *baked, double strength)
 }
 
 /* Numbers and colours that replace: property, quantity, how many components. */
-static void apply_constants(weft_baked *baked, const weft_rad_record *p, bool only_set)
+static void apply_constants(weft_baked *baked, const weft_rad_record *p, const weft_asset *inherited)
 {
     static const struct {
         const char *property;
@@ -303,7 +307,7 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, bool on
         {"rim_amplitude", WEFT_BAKED_RIM_AMPLITUDE, 1},  {"opacity", WEFT_BAKED_OPACITY, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         double values[3];
-        if (!(only_set ? set(p, rows[i].property) : weft_rad_at(p, rows[i].property)))
+        if (!own(p, rows[i].property, inherited))
             continue;
         if (rows[i].planes == 3)
             weft_rad_colour(p, rows[i].property, 1, values);
@@ -311,48 +315,49 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, bool on
             values[0] = weft_rad_number(p, rows[i].property, 0);
         set_constant(baked, rows[i].kind, rows[i].planes, values);
     }
-    if (only_set ? set(p, "tangent_rotation_deg") : weft_rad_at(p, "tangent_rotation_deg")) {
+    if (own(p, "tangent_rotation_deg", inherited)) {
         const double turn = weft_rad_number(p, "tangent_rotation_deg", 0) * acos(-1) / 180;
         const double direction[2] = {cos(turn), sin(turn)};
         set_constant(baked, WEFT_BAKED_TANGENT, 2, direction);
     }
 }
 
-static void apply_factors(weft_baked *baked, const weft_rad_record *p)
+static void apply_factors(weft_baked *baked, const weft_rad_record *p, const weft_asset *inherited)
 {
     static const double black[3] = {0, 0, 0};
     double tint[3];
-    if (weft_rad_at(p, "albedo_tint_color")) {
+    if (own(p, "albedo_tint_color", inherited)) {
         weft_rad_colour(p, "albedo_tint_color", 1, tint);
         multiply(baked, WEFT_BAKED_ALBEDO, tint, 3);
     }
-    if (weft_rad_at(p, "specular_tint_color")) {
+    if (own(p, "specular_tint_color", inherited)) {
         weft_rad_colour(p, "specular_tint_color", 1, tint);
         multiply(baked, WEFT_BAKED_SPECULAR, tint, 3);
     }
-    const double strength = weft_rad_number(p, "normal_strength", 1);
+    const double strength =
+        own(p, "normal_strength", inherited) ? weft_rad_number(p, "normal_strength", 1) : 1;
     if (fabs(strength - 1) > 0)
         steepen(baked, strength);
-    if (!weft_rad_flag(p, "enable_diffuse", true))
+    if (own(p, "enable_diffuse", inherited) && !weft_rad_flag(p, "enable_diffuse", true))
         set_constant(baked, WEFT_BAKED_ALBEDO, 3, black);
-    if (!weft_rad_flag(p, "enable_specular", true))
+    if (own(p, "enable_specular", inherited) && !weft_rad_flag(p, "enable_specular", true))
         set_constant(baked, WEFT_BAKED_SPECULAR, 3, black);
 }
 
-/* @param only_set  over a composite: defaults of the type leave what the layers made */
-static weft_err apply_own(const compositor *c, weft_baked *baked, const weft_rad_record *p, bool only_set,
-                          weft_error *err)
+/* @param inherited  over a composite: what lies above the asset that has the layers, and is not its own */
+static weft_err apply_own(const compositor *c, weft_baked *baked, const weft_rad_record *p,
+                          const weft_asset *inherited, weft_error *err)
 {
-    apply_constants(baked, p, only_set);
-    const weft_rad_member *const scan = weft_rad_at(p, "scan");
+    apply_constants(baked, p, inherited);
+    const weft_rad_member *const scan = own(p, "scan", inherited);
     if (scan)
         WEFT_TRY(put_scan(c, baked, scan, err));
     for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) {
-        const weft_rad_member *const m = weft_rad_at(p, textures[i].property);
+        const weft_rad_member *const m = own(p, textures[i].property, inherited);
         if (m && weft_rad_at(&m->value->record, "name"))
             WEFT_TRY(put_texture(c, baked, &textures[i], &m->value->record, err));
     }
-    apply_factors(baked, p);
+    apply_factors(baked, p, inherited);
     return WEFT_OK;
 }
 
@@ -424,8 +429,12 @@ static weft_err composite(const compositor *c, const weft_asset *asset, int dept
         if (status == WEFT_OK)
             status = lay(c, item, depth, baked, err);
     }
+    const weft_asset *layered =
+        NULL; /* the asset whose text has the layers: what it derives from is below them */
+    if (status == WEFT_OK && layers && layers->value->items)
+        status = weft_assets_find(c->assets, layers->set_by, &layered, err);
     if (status == WEFT_OK)
-        status = apply_own(c, baked, &asset->properties, layers && layers->value->items, err);
+        status = apply_own(c, baked, &asset->properties, layered ? layered->base : NULL, err);
     if (status != WEFT_OK)
         weft_baked_fini(baked);
     return status;

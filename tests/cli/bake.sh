@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# weft bake: what is rebuilt after which change, kill and restart, refusals; judges of the files.
+set -eu
+. "$WEFT_TEST_SOURCE/tests/support/script.sh"
+
+"$WEFT_TEST_BUILD/tests/make-weave-maps" twill.maps
+cat >house.radattr <<'TEXT'
+include <cotton.radattr>
+:dirt := ( opaquematerial :albedo_color = 0.05 :specular_roughness = 0.9 )
+:thread := ( cotton :specular_roughness = 0.6 )
+TEXT
+cat >coat.radattr <<'TEXT'
+include "house.radattr"
+include <metal_thread.radattr>
+:coat := ( clothmaterial
+    :layers = [
+        ( thread :scan = "twill.maps" )
+        ( dirt :alpha = 0.4 :mask = ( :from = cavity :low = 0.6 :high = 0.2 ) )
+        ( dirt :alpha = 0.2 :channels = albedo :mask = ( :from = noise ) )
+        ( thread :alpha = 0.3 :albedo_tint_color = #406080 :channels = albedo )
+    ]
+)
+TEXT
+bake() { "$weft" bake coat.radattr -o coat.material --export png --why "$@" >out 2>&1 || { cat out; exit 1; }; }
+kept() { # STEP...: each is kept
+    for step in "$@"; do grep -qE "^$step +kept" out || { echo "FAILED: $step is not kept"; cat out; exit 1; }; done
+}
+rebuilt() {
+    for step in "$@"; do grep -qE "^$step +rebuilt" out || { echo "FAILED: $step is not rebuilt"; cat out; exit 1; }; done
+}
+
+expect 0 'materials, 1 pictures and scans, 0 warnings' "$weft" bake coat.radattr --check
+bake
+rebuilt composite albedo normal height occlusion 'export png'
+bake
+kept maps 'export png'
+python3 - "$("$weft" bake coat.radattr -o coat.material --json)" <<'TEXT'
+import json, sys
+assert json.loads(sys.argv[1])["rebuilt"] == 0
+TEXT
+
+# a template is touched: nothing; a property this material overrides: nothing; a colour: colours alone
+touch house.radattr
+bake
+kept maps
+echo '// a remark' >>house.radattr
+bake
+kept maps
+sed -i 's/albedo_color = 0.05/albedo_color = 0.07/' house.radattr
+bake
+grep -q 'albedo_color was .* is .*dirt' out
+rebuilt albedo 'export png'
+kept height 'occlusion, cavity, curvature' normal roughness
+# another rule for the mips: normals and roughness alone
+bake --mips vmf
+rebuilt normal roughness
+kept albedo height cavity
+
+# killed at some moment and started again: the same bytes as from nothing
+for delay in 0.1 0.4; do
+    rm -rf coat.material
+    "$weft" bake coat.radattr -o coat.material --export png >/dev/null 2>&1 &
+    sleep "$delay"
+    kill -9 $! 2>/dev/null || true
+    wait $! 2>/dev/null || true
+    bake
+done
+"$weft" bake coat.radattr -o fresh.material --export png >/dev/null
+for file in fresh.material/*.exr fresh.material/png/*.png; do cmp "$file" "coat.material/${file#fresh.material/}"; done
+OMP_NUM_THREADS=3 "$weft" bake coat.radattr -o threads.material --export png >/dev/null
+for file in fresh.material/*.exr; do cmp "$file" "threads.material/${file#fresh.material/}"; done
+
+# judges
+if command -v exrinfo >/dev/null; then exrinfo -s fresh.material/*.exr >/dev/null; fi
+if command -v pngcheck >/dev/null; then pngcheck -q fresh.material/png/*.png; fi
+
+# the text
+expect 0 'is as it should be' "$weft" bake "$WEFT_TEST_SOURCE/shading/material/library/silk.radattr" --format
+expect 0 ':albedo_color = ( :r = 0.07 :g = 0.07 :b = 0.07 )  // dirt' \
+    "$weft" bake house.radattr --material dirt --explain
+expect 1 "there is no material 'thrad'; did you mean 'thread'?" "$weft" bake house.radattr --material thrad --explain
+sed 's/( clothmaterial/( cloathmaterial/' coat.radattr >bad.radattr
+expect 1 "did you mean 'clothmaterial'?" "$weft" bake bad.radattr -o bad.material
+expect 2 "there is no exporter 'gltff'" "$weft" bake coat.radattr -o x.material --export gltff
+mkdir other && echo x >other/notes.txt
+expect 1 'is there already and is no material' "$weft" bake coat.radattr -o other
+rm twill.maps/*.exr
+expect 1 'coat.radattr:5:' "$weft" bake coat.radattr -o gone.material
+[ ! -e gone.material ] && [ ! -e bad.material ]
