@@ -50,14 +50,14 @@ weft_err weft_white_sheet_load(const char *folder, const weft_calibration *cal, 
 }
 
 double weft_white_sheet_predict(const weft_white_sheet *sheet, const weft_calibration *cal,
-                                double reflectance, int light, int channel, int column, int row,
+                                const weft_sheet_kind *kind, int light, int channel, int column, int row,
                                 bool with_grid)
 {
     const double u = weft_white_sheet_centre(sheet, column), v = weft_white_sheet_centre(sheet, row);
     weft_vec3 world, to_light;
-    if (!weft_camera_to_plane(&cal->camera, u, v, 0, &world))
+    if (!weft_camera_to_plane(&cal->camera, u, v, kind->height_mm, &world))
         return (double)NAN;
     const double strength = weft_light_at(&cal->lights[light], world, &to_light) * fmax(to_light.z, 0);
     const double gain = with_grid ? weft_light_grid_gain(cal, light, channel, u, v) : 1;
-    return reflectance * cal->lights[light].intensity[channel] * strength * gain;
+    return kind->reflectance * cal->lights[light].intensity[channel] * strength * gain;
 }

@@ -16,10 +16,14 @@ weft_err weft_white_sheet_save(const char *folder, const weft_white_sheet *sheet
 weft_err weft_white_sheet_load(const char *folder, const weft_calibration *cal, weft_white_sheet *sheet,
                                weft_error *err);
 
-/** What the calibration predicts for the middle of a cell on a sheet of `reflectance`; NaN where the pixel
- * does not meet the plate. */
+/** A sheet to predict: flat and matte. */
+typedef struct weft_sheet_kind {
+    double reflectance, height_mm; /* of its surface over the plate */
+} weft_sheet_kind;
+
+/** What the calibration predicts for the middle of a cell; NaN where the pixel does not meet the sheet. */
 double weft_white_sheet_predict(const weft_white_sheet *sheet, const weft_calibration *cal,
-                                double reflectance, int light, int channel, int column, int row,
+                                const weft_sheet_kind *kind, int light, int channel, int column, int row,
                                 bool with_grid);
 
 #endif

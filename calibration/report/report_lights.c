@@ -141,11 +141,11 @@ static void plot_convergence(const json_t *rounds, weft_text_buffer *page)
 
 typedef enum map_kind { MAP_MODEL, MAP_MEASURED, MAP_GAIN, MAP_RESIDUAL, MAPS } map_kind;
 
-static double map_value(const weft_calibration *cal, const weft_white_sheet *sheet, double reflectance,
-                        map_kind kind, int light, int column, int row)
+static double map_value(const weft_calibration *cal, const weft_white_sheet *sheet,
+                        const weft_sheet_kind *laid, map_kind kind, int light, int column, int row)
 {
-    const double model = weft_white_sheet_predict(sheet, cal, reflectance, light, GREEN, column, row, false);
-    const double gained = weft_white_sheet_predict(sheet, cal, reflectance, light, GREEN, column, row, true);
+    const double model = weft_white_sheet_predict(sheet, cal, laid, light, GREEN, column, row, false);
+    const double gained = weft_white_sheet_predict(sheet, cal, laid, light, GREEN, column, row, true);
     const double seen =
         sheet->value ? (double)weft_white_sheet_plane(sheet, light, GREEN)[row * sheet->columns + column]
                      : (double)NAN;
@@ -161,14 +161,15 @@ static double map_value(const weft_calibration *cal, const weft_white_sheet *she
     }
 }
 
-static weft_err fill_map(const weft_calibration *cal, const weft_white_sheet *sheet, double reflectance,
-                         map_kind kind, int light, weft_image *map, double *most, weft_error *err)
+static weft_err fill_map(const weft_calibration *cal, const weft_white_sheet *sheet,
+                         const weft_sheet_kind *laid, map_kind kind, int light, weft_image *map, double *most,
+                         weft_error *err)
 {
     WEFT_TRY(weft_image_init(map, sheet->columns, sheet->rows, 1, err));
     *most = 0;
     for (int r = 0; r < sheet->rows; r++)
         for (int c = 0; c < sheet->columns; c++) {
-            const double value = map_value(cal, sheet, reflectance, kind, light, c, r);
+            const double value = map_value(cal, sheet, laid, kind, light, c, r);
             weft_image_row(map, 0, r)[c] = (float)value;
             if (isfinite(value))
                 *most = fmax(*most, fabs(value));
@@ -201,14 +202,13 @@ static void plot_map(const weft_camera *camera, const weft_image *map, map_kind 
 }
 
 /* Model and measured share one scale; deviations have their own. */
-static void plot_light(const weft_calibration *cal, const weft_white_sheet *sheet, double reflectance,
-                       int light, weft_text_buffer *page)
+static void plot_light(const weft_calibration *cal, const weft_white_sheet *sheet,
+                       const weft_sheet_kind *laid, int light, weft_text_buffer *page)
 {
     weft_image maps[MAPS] = {{0}};
     double most[MAPS] = {0};
     for (int k = 0; k < MAPS; k++)
-        if (fill_map(cal, sheet, reflectance, (map_kind)k, light, &maps[k], &most[k], &page->failure) !=
-            WEFT_OK)
+        if (fill_map(cal, sheet, laid, (map_kind)k, light, &maps[k], &most[k], &page->failure) != WEFT_OK)
             break;
     const double shared = fmax(most[MAP_MODEL], most[MAP_MEASURED]);
     weft_text_add(page, "<div class=\"maps\">\n");
@@ -225,13 +225,16 @@ static void plot_light(const weft_calibration *cal, const weft_white_sheet *shee
 
 static void plot_maps(const weft_calibration *cal, const weft_white_sheet *sheet, weft_text_buffer *page)
 {
-    const double told = weft_report_number(weft_calibration_get_report(cal, "lights"), "reflectance");
-    const int height = COLUMNS * cal->camera.height / cal->camera.width;
+    const json_t *const report = weft_calibration_get_report(cal, "lights");
+    const double reflectance = weft_report_number(report, "reflectance");
+    const double height = weft_report_number(report, "sheet_height_mm");
+    const weft_sheet_kind laid = {isnan(reflectance) ? 1 : reflectance, isnan(height) ? 0 : height};
+    const int rows = COLUMNS * cal->camera.height / cal->camera.width;
     weft_white_sheet cells = {.width = cal->camera.width,
                               .height = cal->camera.height,
                               .cell_px = cal->camera.width / COLUMNS > 0 ? cal->camera.width / COLUMNS : 1,
                               .columns = COLUMNS,
-                              .rows = height > 0 ? height : 1,
+                              .rows = rows > 0 ? rows : 1,
                               .n_lights = cal->n_lights};
     weft_text_add(
         page,
@@ -245,8 +248,12 @@ static void plot_maps(const weft_calibration *cal, const weft_white_sheet *sheet
             "The averaged sheet is not in the calibration's folder: measured maps and residuals cannot be "
             "drawn. It is kept by",
             "weft calibrate lights white.set -o CAL --force");
+    if (json_is_true(json_object_get(json_object_get(report, "sheet"), "bow_used")))
+        weft_text_add(page,
+                      "<p>The sheet was bowed and the lights were fitted so; the maps take it for flat, so "
+                      "what it does to the light shows in them.</p>\n");
     for (int l = 0; l < cal->n_lights; l++)
-        plot_light(cal, sheet ? sheet : &cells, isnan(told) ? 1 : told, l, page);
+        plot_light(cal, sheet ? sheet : &cells, &laid, l, page);
 }
 
 static void table(const weft_calibration *cal, const json_t *report, weft_text_buffer *page)
@@ -255,7 +262,8 @@ static void table(const weft_calibration *cal, const json_t *report, weft_text_b
     weft_text_add(
         page,
         "<table><tr><th>light</th><th>x, mm</th><th>y</th><th>z</th><th>&plusmn; mm</th><th>exponent</th>"
-        "<th>red</th><th>green</th><th>blue</th><th>off by, %%</th><th>without grid</th><th>left "
+        "<th>red</th><th>green</th><th>blue</th><th>&plusmn; %%</th><th>off by, %%</th><th>without "
+        "grid</th><th>left "
         "out</th></tr>\n");
     for (int l = 0; l < cal->n_lights; l++) {
         const weft_light *const t = &cal->lights[l];
@@ -269,6 +277,7 @@ static void table(const weft_calibration *cal, const json_t *report, weft_text_b
         weft_report_cell(page, 3, t->distant ? (double)NAN : t->exponent);
         for (int c = 0; c < 3; c++)
             weft_report_cell(page, 4, t->intensity[c]);
+        weft_report_cell(page, 2, 100 * weft_report_number(json_object_get(more, "sigma"), "irradiance"));
         weft_report_cell(page, 3, t->residual > 0 ? 100 * t->residual : (double)NAN);
         weft_report_cell(page, 3, 100 * weft_report_number(more, "residual_without_grid"));
         weft_report_cell(page, 4, weft_report_number(more, "left_out"));

@@ -119,6 +119,32 @@ static void judge_lamps(const weft_calibration *cal, weft_verdict *v)
             "The worst known position is that of light %d: +- %.1f mm.", unsure, sigma);
 }
 
+/* How the sheet lay: its larger bow and tilt, of those that stand out from their uncertainty. */
+static void judge_sheet(const json_t *sheet, weft_verdict *v)
+{
+    static const char *const bows[2] = {"bow_mm", "bow_sigma_mm"}, *const tilts[2] = {"tilt_rad",
+                                                                                      "tilt_sigma_rad"};
+    double bow = 0, tilt = 0, unsure = 0;
+    for (size_t i = 0; i < 2; i++) {
+        unsure = fmax(unsure, weft_report_item(json_object_get(sheet, bows[1]), i));
+        const double b = fabs(weft_report_item(json_object_get(sheet, bows[0]), i));
+        const double t = fabs(weft_report_item(json_object_get(sheet, tilts[0]), i));
+        if (b > 3 * weft_report_item(json_object_get(sheet, bows[1]), i))
+            bow = fmax(bow, b);
+        if (t > 3 * weft_report_item(json_object_get(sheet, tilts[1]), i))
+            tilt = fmax(tilt, t);
+    }
+    if (!sheet)
+        return;
+    add(v, grade_of(bow, 0.2, 1), "lights", "Stretch the sheet over a flat plate, or glue it to one.",
+        bow > 0 ? "The sheet was bowed by %.2f mm." : "No bow of the sheet can be told from none (%.2f mm).",
+        bow);
+    if (tilt > 0)
+        add(v, grade_of(tilt, 0.003, 0.009), "lights",
+            "The sheet must lie where the board lay: on the plate.",
+            "The sheet was tilted by %.2f degrees against the board on the table.", tilt * (180 / M_PI));
+}
+
 static void judge_lights(const weft_calibration *cal, weft_verdict *v)
 {
     const json_t *const lights = weft_calibration_get_report(cal, "lights");
@@ -134,6 +160,7 @@ static void judge_lights(const weft_calibration *cal, weft_verdict *v)
                                   : "The fit of the %d lights had not settled after %zu rounds.",
             cal->n_lights, json_array_size(json_object_get(lights, "rounds")));
     judge_lamps(cal, v);
+    judge_sheet(json_object_get(lights, "sheet"), v);
 }
 
 static void judge_linearity(const weft_calibration *cal, weft_verdict *v)

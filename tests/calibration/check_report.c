@@ -166,7 +166,9 @@ static void test_what_is_bad_is_named(void **state)
     report(&cal, "lens",
            "{\"held_out_px\":2.5,\"coverage\":0.3,\"sigma\":{\"fx\":90},\"views\":[{\"image\":\"<b>bold\","
            "\"rms_px\":9,\"used\":false}]}");
-    report(&cal, "lights", "{\"settled\":false,\"rounds\":[{},{}]}");
+    report(&cal, "lights",
+           "{\"settled\":false,\"rounds\":[{},{}],\"sheet\":{\"bow_mm\":[1.5,0.1],\"bow_sigma_mm\":[0.1,0.1],"
+           "\"tilt_rad\":[0.005,0],\"tilt_sigma_rad\":[0.001,0.001],\"bow_used\":true}}");
     report(&cal, "white", "{\"lights\":[{\"difference_from_sheet\":0.08}]}");
     report(&cal, "colour",
            "{\"chart\":\"macbeth\",\"edition\":\"ohta1997\",\"patches\":[{\"name\":\"dark skin\","
@@ -180,6 +182,8 @@ static void test_what_is_bad_is_named(void **state)
     assert_grade(&v, "lights", "had not settled", WEFT_GRADE_REDO);
     assert_grade(&v, "lights", "2.00 % at most (light 1)", WEFT_GRADE_REDO);
     assert_grade(&v, "lights", "light 0: +- 12.0 mm", WEFT_GRADE_FAIR);
+    assert_grade(&v, "lights", "bowed by 1.50 mm", WEFT_GRADE_REDO);
+    assert_grade(&v, "lights", "tilted by 0.29 degrees", WEFT_GRADE_FAIR);
     assert_grade(&v, "linearity", "20.0 %", WEFT_GRADE_REDO);
     assert_grade(&v, "linearity", "no exposure series", WEFT_GRADE_FAIR);
     assert_grade(&v, "white", "8.00 %", WEFT_GRADE_REDO);
