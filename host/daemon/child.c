@@ -14,7 +14,6 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -202,6 +201,11 @@ _Noreturn static void become(const char *program, char *const *words, pid_t pare
     static const int to[] = {STDOUT_FILENO, STDERR_FILENO, REPORT_FD};
     char byte;
     sigset_t none;
+    static const int handled[] = {SIGTERM, SIGINT, SIGHUP, SIGPIPE}; /* by the daemon, not by a job */
+    for (int i = 0; i < 4; i++)
+        signal(handled[i], SIG_DFL);
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, NULL);
     setpgid(0, 0);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) /* it died before that */
@@ -227,10 +231,7 @@ _Noreturn static void become(const char *program, char *const *words, pid_t pare
         (void)!write(oom, "500", 3); /* when memory runs out the job goes, not the daemon */
         close(oom);
     }
-    (void)setpriority(PRIO_PROCESS, 0, nice_by);
-    sigemptyset(&none);
-    sigprocmask(SIG_SETMASK, &none, NULL);
-    signal(SIGPIPE, SIG_DFL);
+    (void)!nice(nice_by);
     setenv(WEFT_REPORT_ENV, "3", 1);
     setenv("WEFT_SOCKET", "none", 1); /* it is the one who opens the devices */
     execv(program, words);
@@ -271,7 +272,13 @@ static weft_err spawn(weft_child *c, const char *program, char *const *words, in
     int pairs[4][2]; /* out, err, report, go: [0] reads, [1] writes */
     WEFT_TRY(open_pairs(pairs, err));
     const pid_t parent = getpid();
+    sigset_t all, before;
+    sigfillset(&all);
+    sigprocmask(SIG_SETMASK, &all,
+                &before); /* a signal to the child must not run the daemon's handler in it */
     const pid_t pid = fork();
+    if (pid != 0)
+        sigprocmask(SIG_SETMASK, &before, NULL);
     if (pid == 0)
         become(program, words, parent, nice_by,
                (const int[]){pairs[0][1], pairs[1][1], pairs[2][1], pairs[3][0]});

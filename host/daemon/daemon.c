@@ -18,8 +18,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
+#include <sys/eventfd.h>
 #include <sys/file.h>
-#include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
@@ -115,28 +115,37 @@ static weft_err load_secrets(daemon_state *d, weft_error *err)
     return status;
 }
 
-/* Ctrl-C, SIGTERM: end.  Read from a descriptor, so that nothing is interrupted. */
-static void on_signal(void *context, uint32_t events)
+/* Where the signal handler writes: an eventfd.  A handler, not a signalfd: libraries have threads of their
+ * own that were there before any signal could be blocked, and one of them would take it. */
+static int signal_fd = -1;
+
+static void note_signal(int number)
 {
-    daemon_state *const d = context;
-    struct signalfd_siginfo info;
-    (void)events;
-    if (read(d->signals, &info, sizeof info) == sizeof info)
-        d->stopping = true;
+    const int saved = errno;
+    const uint64_t one = 1;
+    (void)number;
+    (void)!write(signal_fd, &one, sizeof one);
+    errno = saved;
 }
 
+static void on_signal(void *context, uint32_t events)
+{
+    (void)events;
+    ((daemon_state *)context)->stopping = true;
+}
+
+/* Ctrl-C and SIGTERM end the daemon in good order. */
 static weft_err take_signals(daemon_state *d, weft_error *err)
 {
-    sigset_t set;
-    sigemptyset(&set);
-    sigaddset(&set, SIGTERM);
-    sigaddset(&set, SIGINT);
-    sigprocmask(SIG_BLOCK, &set, NULL);
-    signal(SIGPIPE, SIG_IGN);
-    signal(SIGHUP, SIG_IGN);
-    d->signals = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    struct sigaction action = {.sa_handler = note_signal, .sa_flags = SA_RESTART};
+    d->signals = signal_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (d->signals < 0)
         return weft_fail_errno(err, WEFT_ERR_IO, "no descriptor for signals");
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGINT, &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    signal(SIGHUP, SIG_IGN);
     return weft_loop_watch(d->loop, d->signals, EPOLLIN, on_signal, d, err);
 }
 
@@ -250,6 +259,7 @@ static void stop(daemon_state *d)
 {
     const double begin_s = weft_clock_s();
     sd_notify(0, "STOPPING=1");
+    weft_loop_forget(d->loop, d->signals); /* it stays readable */
     weft_queue_stop(d->queue);
     while (weft_queue_running(d->queue) > 0 && weft_clock_s() - begin_s < STOP_S)
         turn(d);
@@ -264,8 +274,11 @@ static void take_down(daemon_state *d)
     weft_library_db_close(d->db);
     if (d->own_socket)
         (void)unlink(d->options->socket ? d->options->socket : d->socket);
-    if (d->signals >= 0)
+    if (d->signals >= 0) {
+        signal(SIGTERM, SIG_DFL);
+        signal(SIGINT, SIG_DFL);
         close(d->signals);
+    }
     weft_loop_destroy(d->loop);
     if (d->lock >= 0)
         close(d->lock);

@@ -187,7 +187,110 @@ def test_live_stream(d, rig):
     assert counts[0] > counts[1] >= 2, counts
 
 
-def test_sigkill_of_weftd(d, rig):
+def second_attempt(d, job, folder):
+    """What each row of the fault matrix ends with: whole files, and a job that completes when it is resumed."""
+    if frames_of(folder):
+        check_set(folder, "capturing", 1)
+    assert d.post(f"/v1/jobs/{job}/resume").status == 202
+    ended = d.wait(job)
+    assert ended["state"] == "done", ended
+    check_set(folder)
+
+
+def test_host_sigterm(d, rig):
+    """SIGTERM of weftd in mid capture: dark at once, the job is kept and goes on."""
+    job = d.add("capture", "term.set", exposure=0.15)
+    wait_for_frames(f"{d.library}/term.set", 3)
+    before = children(d.process.pid)
+    d.process.send_signal(signal.SIGTERM)
+    rig.wait_dark(1)
+    assert d.process.wait(20) == 0 and not any(alive(p) for p in before)
+    check_set(f"{d.library}/term.set", "capturing", 3)
+    d.start()
+    ended = d.wait(job)
+    assert ended["state"] == "done" and ended["attempt"] == 2 and ended["result"]["kept"] >= 3, ended
+    check_set(f"{d.library}/term.set")
+
+
+def test_host_disk_full(d, rig):
+    folder = f"{d.library}/small"
+    os.makedirs(folder)
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=12m", "none", folder], capture_output=True, check=False).returncode:
+        print("skipped: no tmpfs may be mounted here")
+        return
+    try:
+        job = d.add("capture", "small/full.set", exposure=0.15)
+        wait_for_frames(f"{folder}/full.set", 2)
+        with open(f"{folder}/filler", "wb") as filler:
+            try:
+                while True:
+                    filler.write(b"x" * 65536)
+                    filler.flush()
+            except OSError:
+                pass
+        ended = d.wait(job)
+        assert ended["state"] == "failed" and ("No space" in ended["error"] or "disk full" in ended["error"]), ended
+        rig.wait_dark(1)
+        os.remove(f"{folder}/filler")
+        second_attempt(d, job, f"{folder}/full.set")
+    finally:
+        subprocess.run(["umount", folder], check=False)
+
+
+def test_host_read_only_folder(d, rig):
+    folder = f"{d.library}/closed"
+    os.makedirs(folder)
+    if subprocess.run(["mount", "--bind", folder, folder], capture_output=True, check=False).returncode:
+        print("skipped: nothing may be mounted here")
+        return
+    try:
+        subprocess.run(["mount", "-o", "remount,bind,ro", folder], check=True)
+        job = d.add("capture", "closed/x.set", exposure=0.02)
+        ended = d.wait(job)
+        assert ended["state"] == "failed" and "closed/x.set" in ended["error"], ended
+        rig.wait_dark(1)
+        subprocess.run(["mount", "-o", "remount,bind,rw", folder], check=True)
+        second_attempt(d, job, f"{folder}/x.set")
+    finally:
+        subprocess.run(["umount", folder], check=False)
+
+
+def test_host_clock_step(d, rig):
+    """The clock jumps back a day and forward a year in mid capture: nothing waits longer or shorter for it."""
+    shim = f"{os.path.dirname(BIN)}/tests/libclock_step.so"
+    if "sanitize" in BIN:
+        print("skipped: the sanitizers want to be loaded first")
+        return
+    step = f"{d.folder}/clock"
+
+    def jump(seconds):
+        with open(step + ".new", "w", encoding="utf-8") as file:
+            file.write(str(seconds))
+        os.rename(step + ".new", step)
+    d.stop()
+    jump(0)
+    d.env.update(LD_PRELOAD=shim, WEFT_TEST_CLOCK=step)
+    try:
+        d.start()
+        begin_s = time.monotonic()
+        job = d.add("capture", "clock.set", exposure=0.15)
+        wait_for_frames(f"{d.library}/clock.set", 2)
+        jump(-86400)
+        wait_for_frames(f"{d.library}/clock.set", 5)
+        jump(365 * 86400)
+        ended = d.wait(job)
+        assert ended["state"] == "done" and ended["attempt"] == 1, ended
+        assert time.monotonic() - begin_s < 15 * SLOW
+        years = {frame["capture"]["taken"][:4] for frame in check_set(f"{d.library}/clock.set")["frames"]}
+        assert len(years) == 2, f"the clock did not step: {years}"
+        assert d.run("light status")["state"] == "done"
+    finally:
+        d.stop()
+        d.env.pop("LD_PRELOAD")
+        d.start()
+
+
+def test_host_sigkill(d, rig):
     """kill -9 at random moments of a capture: dark within the lease, no process left, and the next daemon
     completes the set."""
     seed = int(os.environ.get("WEFT_SEED", random.randrange(1 << 30)))

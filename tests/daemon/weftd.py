@@ -48,6 +48,7 @@ class Weftd:
         self.library, self.socket = os.path.join(folder, "library"), os.path.join(folder, "weftd.sock")
         self.log = os.path.join(folder, "weftd.log")
         self.env = dict(os.environ, **(env or {}))
+        self.env.pop("OPENBLAS_NUM_THREADS", None)  # with the threads that libraries have when nobody forbids them
         os.makedirs(self.library, exist_ok=True)
 
     def start(self):
@@ -68,8 +69,10 @@ class Weftd:
 
     __enter__ = start
 
-    def __exit__(self, *_):
-        self.stop()
+    def __exit__(self, failed, *_):
+        running = self.process.poll() is None
+        status = self.stop()
+        assert failed or not running or status == 0, f"weftd ends with {status}: {self.words()[-2000:]}"
 
     def words(self):
         with open(self.log, encoding="utf-8") as log:
@@ -249,7 +252,7 @@ class Rig:
         if not os.path.exists(f"{BIN}/weft-rig"):
             print("skipped: this build has no weft-rig")
             sys.exit(77)
-        self.lock = open("/tmp/weft-rig.lock", "a", encoding="utf-8")
+        self.lock = open(os.environ.get("WEFT_RIG_LOCK", "/tmp/weft-rig.lock"), "a", encoding="utf-8")
         fcntl.flock(self.lock, fcntl.LOCK_EX)
         self.process = subprocess.Popen([f"{BIN}/weft-rig", "--quiet", "--dir", self.folder, *self.words],
                                         stdout=subprocess.PIPE)

@@ -8,6 +8,7 @@
 #include "firmware/protocol.h"
 
 #include <stdio.h>
+#include <string.h>
 
 static weft_err seed_path(const char *folder, const char *reader, const char *name, char path[1024],
                           weft_error *err)
@@ -104,6 +105,26 @@ static weft_err write_texts(const char *folder, weft_error *err)
     return WEFT_OK;
 }
 
+static weft_err write_jobs(const char *folder, weft_error *err)
+{
+    static const char *const jobs[] = {
+        "{\"command\":\"solve\",\"operands\":[\"a.set\"],\"options\":{\"calibration\":\"a.cal\",\"output\":"
+        "\"a.maps\",\"force\":true}}",
+        "{\"command\":\"capture\",\"operands\":[\"a.set\"],\"options\":{\"exposure\":0.04,\"bracket\":3}}",
+        "{\"command\":\"preview\",\"operands\":[\"a\"],\"options\":{\"output\":\"a.png\",\"light\":[1,2],"
+        "\"param\":"
+        "[\"a=1\"]},\"format\":\"text\",\"hold\":false}",
+        "/v1/jobs/12/log%20",
+    };
+    for (size_t i = 0; i < sizeof jobs / sizeof jobs[0]; i++) {
+        char path[1024], name[8];
+        snprintf(name, sizeof name, "%zu", i);
+        WEFT_TRY(seed_path(folder, "job", name, path, err));
+        WEFT_TRY(weft_file_write(path, jobs[i], strlen(jobs[i]), err));
+    }
+    return WEFT_OK;
+}
+
 static weft_err write_frame(const char *folder, weft_error *err)
 {
     const weft_frame frame = {.version = 1, .n = 3, .payload = {1, 0, 2}};
@@ -128,6 +149,8 @@ int main(int argc, char **argv)
         status = write_raws(argv[1], &error);
     if (status == WEFT_OK)
         status = write_texts(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_jobs(argv[1], &error);
     if (status == WEFT_OK)
         status = write_frame(argv[1], &error);
     if (status != WEFT_OK)
