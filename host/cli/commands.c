@@ -8,6 +8,7 @@ extern const weft_command weft_cmd_calibrate_white;
 extern const weft_command weft_cmd_capture;
 extern const weft_command weft_cmd_calibrate_lens;
 extern const weft_command weft_cmd_calibrate_lights;
+extern const weft_command weft_cmd_check;
 extern const weft_command weft_cmd_compare;
 extern const weft_command weft_cmd_completion;
 extern const weft_command weft_cmd_devices;
@@ -54,6 +55,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_calibrate_report,
     &weft_cmd_import,
     &weft_cmd_solve,
+    &weft_cmd_check,
     &weft_cmd_compare,
     &weft_cmd_bake,
     &weft_cmd_preview,

@@ -14,7 +14,7 @@ static const float cut2 = 9.0F;
 /* A triple whose directions span less volume than this says little; more keeps the smallest singular value
  * above WEFT_SOLVE_MIN_SINGULAR. */
 static const float least_volume = 0.08F;
-/* Triples tried with many lights; all of 12 lights are 220. */
+/* Triples tried of more than FEW_LIGHTS lights; all of 12 lights are as many. */
 enum { MOST_TRIPLES = 220 };
 
 /* ---- least squares with weights, and the answers ---- */
@@ -104,22 +104,37 @@ typedef struct candidates {
     float x[WEFT_LANES], y[WEFT_LANES], z[WEFT_LANES], cost[WEFT_LANES];
 } candidates;
 
+typedef struct lane_vectors {
+    float x[WEFT_LANES], y[WEFT_LANES], z[WEFT_LANES];
+} lane_vectors;
+
+/* Up to this many lights every triple is tried, and the cross products of all pairs are kept. */
+enum { FEW_LIGHTS = 12, FEW_PAIRS = FEW_LIGHTS * (FEW_LIGHTS - 1) / 2 };
+
+/* Light and sample over sigma; 0 for what is left out. */
+typedef struct scaled_light {
+    lane_vectors light;
+    float grey[WEFT_LANES], weight[WEFT_LANES];
+} scaled_light;
+
 /* 1 / sigma^2 of every sample; 0 for what is left out. */
 WEFT_INLINE void weigh(const weft_solve_samples *s, const weft_lane_weights *weights,
-                       const float peak[WEFT_LANES], weft_lane_weights *inverse)
+                       const float peak[WEFT_LANES], weft_lane_weights *inverse, scaled_light *scaled)
 {
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
             const float tolerance = WEFT_SOLVE_MISFIT * peak[k];
             const float variance = s->at[j].variance[k] + tolerance * tolerance;
-            inverse[j].at[k] = weights[j].at[k] / (variance > 0 ? variance : 1.0F);
+            const float over2 = weights[j].at[k] / (variance > 0 ? variance : 1.0F), over = sqrtf(over2);
+            inverse[j].at[k] = over2;
+            scaled[j].weight[k] = weights[j].at[k];
+            scaled[j].grey[k] = over * s->at[j].grey[k];
+            scaled[j].light.x[k] = over * s->at[j].light[0][k];
+            scaled[j].light.y[k] = over * s->at[j].light[1][k];
+            scaled[j].light.z[k] = over * s->at[j].light[2][k];
         }
 }
-
-typedef struct lane_vectors {
-    float x[WEFT_LANES], y[WEFT_LANES], z[WEFT_LANES];
-} lane_vectors;
 
 WEFT_INLINE void cross(const weft_solve_light *a, const weft_solve_light *b, lane_vectors *to)
 {
@@ -131,66 +146,104 @@ WEFT_INLINE void cross(const weft_solve_light *a, const weft_solve_light *b, lan
     }
 }
 
-/* Tries the scaled normal that three lights agree on: Cramer's rule with the cross product of the first two,
- * which the third light's triples share. */
-WEFT_INLINE void try_triple(const weft_solve_samples *s, const weft_lane_weights *inverse, int i, int j,
-                            int l, const lane_vectors *ij, candidates *best)
+/* Three lights and the cross products of their pairs. */
+typedef struct triple {
+    int i, j, l;
+    const lane_vectors *ij, *il, *jl;
+} triple;
+
+/* The scaled normal that three lights agree on, by Cramer's rule; cost infinite where there is none. */
+WEFT_INLINE void agree(const weft_solve_samples *s, const scaled_light *scaled, const triple *t,
+                       candidates *to)
 {
-    const weft_solve_light *const a = &s->at[i], *const b = &s->at[j], *const c = &s->at[l];
-    lane_vectors bc, ca, v;
-    float cost[WEFT_LANES];
-    cross(b, c, &bc);
-    cross(c, a, &ca);
+    const weft_solve_light *const a = &s->at[t->i], *const b = &s->at[t->j], *const c = &s->at[t->l];
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++) {
         const float volume =
-            ij->x[k] * c->light[0][k] + ij->y[k] * c->light[1][k] + ij->z[k] * c->light[2][k];
-        const float used = inverse[i].at[k] * inverse[j].at[k] * inverse[l].at[k];
+            t->ij->x[k] * c->light[0][k] + t->ij->y[k] * c->light[1][k] + t->ij->z[k] * c->light[2][k];
+        const float used = scaled[t->i].weight[k] * scaled[t->j].weight[k] * scaled[t->l].weight[k];
         const int fit = (fabsf(volume) > least_volume) & (used > 0);
         const float over = 1 / (fit ? volume : 1.0F);
-        v.x[k] = over * (a->grey[k] * bc.x[k] + b->grey[k] * ca.x[k] + c->grey[k] * ij->x[k]);
-        v.y[k] = over * (a->grey[k] * bc.y[k] + b->grey[k] * ca.y[k] + c->grey[k] * ij->y[k]);
-        v.z[k] = over * (a->grey[k] * bc.z[k] + b->grey[k] * ca.z[k] + c->grey[k] * ij->z[k]);
-        cost[k] = fit ? 0.0F : INFINITY;
+        to->x[k] = over * (a->grey[k] * t->jl->x[k] - b->grey[k] * t->il->x[k] + c->grey[k] * t->ij->x[k]);
+        to->y[k] = over * (a->grey[k] * t->jl->y[k] - b->grey[k] * t->il->y[k] + c->grey[k] * t->ij->y[k]);
+        to->z[k] = over * (a->grey[k] * t->jl->z[k] - b->grey[k] * t->il->z[k] + c->grey[k] * t->ij->z[k]);
+        to->cost[k] = fit ? 0.0F : INFINITY;
     }
-    for (int m = 0; m < s->n_lights; m++)
+}
+
+/* Adds what the lights of `first` to `last` do not agree with. */
+WEFT_INLINE void add_cost(const scaled_light *scaled, int first, int last, candidates *v)
+{
+    for (int m = first; m < last; m++)
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
             const float d =
-                s->at[m].grey[k] - (v.x[k] * s->at[m].light[0][k] + v.y[k] * s->at[m].light[1][k] +
-                                    v.z[k] * s->at[m].light[2][k]);
-            const float q = d * d * inverse[m].at[k];
-            cost[k] += q < cut2 ? q : cut2;
+                scaled[m].grey[k] - (v->x[k] * scaled[m].light.x[k] + v->y[k] * scaled[m].light.y[k] +
+                                     v->z[k] * scaled[m].light.z[k]);
+            const float q = d * d;
+            v->cost[k] += q < cut2 ? q : cut2;
         }
+}
+
+WEFT_INLINE void try_triple(const weft_solve_samples *s, const scaled_light *scaled, const triple *t,
+                            candidates *best)
+{
+    candidates v;
+    agree(s, scaled, t, &v);
+    add_cost(scaled, 0, t->i, &v); /* its own three lights it fits */
+    add_cost(scaled, t->i + 1, t->j, &v);
+    add_cost(scaled, t->j + 1, t->l, &v);
+    add_cost(scaled, t->l + 1, s->n_lights, &v);
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++) {
-        const int better = cost[k] < best->cost[k];
-        best->cost[k] = better ? cost[k] : best->cost[k];
+        const int better = v.cost[k] < best->cost[k];
+        best->cost[k] = better ? v.cost[k] : best->cost[k];
         best->x[k] = better ? v.x[k] : best->x[k];
         best->y[k] = better ? v.y[k] : best->y[k];
         best->z[k] = better ? v.z[k] : best->z[k];
     }
 }
 
-/* All triples of up to 12 lights; of more, every so many in a fixed order. */
-WEFT_INLINE void try_triples(const weft_solve_samples *s, const weft_lane_weights *inverse, candidates *best)
+/* Where the pair (i, j), i < j, of n lights is kept. */
+static inline int pair_of(int i, int j, int n)
+{
+    return i * n - i * (i + 1) / 2 + j - i - 1;
+}
+
+WEFT_INLINE void try_all(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
+{
+    _Alignas(64) lane_vectors pairs[FEW_PAIRS];
+    const int n = s->n_lights;
+    for (int i = 0; i < n; i++)
+        for (int j = i + 1; j < n; j++)
+            cross(&s->at[i], &s->at[j], &pairs[pair_of(i, j, n)]);
+    for (int i = 0; i < n; i++)
+        for (int j = i + 1; j < n; j++)
+            for (int l = j + 1; l < n; l++) {
+                const triple t = {
+                    i, j, l, &pairs[pair_of(i, j, n)], &pairs[pair_of(i, l, n)], &pairs[pair_of(j, l, n)]};
+                try_triple(s, scaled, &t, best);
+            }
+}
+
+/* Of many lights' triples every so many, in a fixed order. */
+WEFT_INLINE void try_some(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
 {
     const long n = s->n_lights, all = n * (n - 1) * (n - 2) / 6;
-    const long tried = all < MOST_TRIPLES ? all : MOST_TRIPLES;
-    long step = 0;
+    long next = all / (2 * MOST_TRIPLES), number = 0, tried = 0;
     for (int i = 0; i < n; i++)
         for (int j = i + 1; j < n; j++) {
-            lane_vectors ij;
-            bool crossed = false;
-            for (int l = j + 1; l < n; l++) {
-                step += tried;
-                if (step < all)
+            for (int l = j + 1; l < n; l++, number++) {
+                lane_vectors ij, il, jl;
+                if (number != next)
                     continue;
-                step -= all;
-                if (!crossed)
-                    cross(&s->at[i], &s->at[j], &ij);
-                crossed = true;
-                try_triple(s, inverse, i, j, l, &ij, best);
+                cross(&s->at[i], &s->at[j], &ij);
+                cross(&s->at[i], &s->at[l], &il);
+                cross(&s->at[j], &s->at[l], &jl);
+                const triple t = {i, j, l, &ij, &il, &jl};
+                try_triple(s, scaled, &t, best);
+                tried++;
+                next = (2 * tried + 1) * all / (2 * MOST_TRIPLES);
             }
         }
 }
@@ -215,6 +268,7 @@ static WEFT_CLONES void search_robust(const weft_solve_samples *restrict samples
                                       weft_solve_answers *restrict answers)
 {
     _Alignas(64) weft_lane_weights lit[WEFT_LIGHTS_MAX], inverse[WEFT_LIGHTS_MAX], kept[WEFT_LIGHTS_MAX];
+    _Alignas(64) scaled_light scaled_lights[WEFT_LIGHTS_MAX];
     float peak[WEFT_LANES], dropped[WEFT_LANES], mark[WEFT_LANES];
     candidates best = {0};
     weft_lane_sums t;
@@ -222,13 +276,16 @@ static WEFT_CLONES void search_robust(const weft_solve_samples *restrict samples
     weft_lane_misfits m;
     weft_lane_peak(samples, peak);
     weft_lane_leave_shadows(samples, lit, dropped);
-    weigh(samples, lit, peak, inverse);
+    weigh(samples, lit, peak, inverse, scaled_lights);
     for (int k = 0; k < WEFT_LANES; k++) {
         best.cost[k] = INFINITY;
         mark[k] = 1;
         answers->search[k] = 0;
     }
-    try_triples(samples, inverse, &best);
+    if (samples->n_lights <= FEW_LIGHTS)
+        try_all(samples, scaled_lights, &best);
+    else
+        try_some(samples, scaled_lights, &best);
     keep_agreeing(samples, inverse, &best, lit, kept);
     solve_weighted(samples, kept, &t, &scaled, answers);
     weft_lane_measure(samples, kept, &scaled, &m);

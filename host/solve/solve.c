@@ -8,6 +8,7 @@
 #include "host/solve/info.h"
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
+#include "host/solve/refuse.h"
 #include "host/solve/site_albedo.h"
 #include "host/solve/solve_row.h"
 
@@ -54,7 +55,7 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
                          set->folder, n, cal_folder, cal->n_lights);
     if (cal->has_camera)
         WEFT_TRY(weft_calibration_require_size(cal, set->width, set->height, cal_folder, err));
-    return WEFT_OK;
+    return weft_refuse_cone(cal, cal_folder, options->height_mm, err);
 }
 
 /* ---- solving ---- */
@@ -232,6 +233,19 @@ static weft_err follow_drift(const weft_set *set, const weft_light_plates *plate
     return WEFT_OK;
 }
 
+static weft_err require_answers(const weft_maps *maps, const weft_mask *inside, const weft_set *set,
+                                weft_error *err)
+{
+    const size_t n = (size_t)maps->width * (size_t)maps->height;
+    for (size_t i = 0; i < n; i++)
+        if (maps->mask.data[i])
+            return weft_refuse_few_lights(set, &maps->lights, inside, err);
+    return weft_fail(err, WEFT_ERR_NODATA,
+                     "%s: no pixel has three usable lights (all clipped, black, or masked: look at the "
+                     "exposure of its frames)",
+                     set->folder);
+}
+
 /* All at sensor geometry. */
 static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal,
                                 const weft_solve_options *options, weft_pixel_scale pixel, weft_maps *maps,
@@ -260,7 +274,8 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
                                 .width = plates.width,
                                 .cfa = plates.cfa,
                                 .shadow = (float)options->shadow};
-        if (plan.method->takes_gloss && !options->matte)
+        status = weft_refuse_coded(set, &plan, &plates, &inside, err);
+        if (status == WEFT_OK && plan.method->takes_gloss && !options->matte)
             status = weft_cloth_gloss(&plan, &plates, &inside, &run->gloss, &run->report, err);
         if (run->report.found)
             plan.gloss = &run->gloss;
@@ -268,6 +283,8 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
         solve_job job = {&plan, &plates, &inside, cal, maps};
         if (status == WEFT_OK)
             status = solve_all_rows(&job, options, pixel, run, err);
+        if (status == WEFT_OK)
+            status = require_answers(maps, &inside, set, err);
     }
     run->seconds.solve = weft_clock_s() - clock;
     weft_incidence_fini(&incidence);
@@ -291,18 +308,6 @@ static weft_err put_on_plane(weft_maps *maps, const weft_calibration *cal, const
     return WEFT_OK;
 }
 
-static weft_err require_an_answer(const weft_maps *maps, const weft_set *set, weft_error *err)
-{
-    const size_t n = (size_t)maps->width * (size_t)maps->height;
-    for (size_t i = 0; i < n; i++)
-        if (maps->mask.data[i])
-            return WEFT_OK;
-    return weft_fail(err, WEFT_ERR_NODATA,
-                     "%s: no pixel has three usable lights (all clipped, black, or masked: look at the "
-                     "exposure of its frames)",
-                     set->folder);
-}
-
 weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
                         const weft_solve_options *options, weft_maps *maps, weft_error *err)
 {
@@ -314,8 +319,6 @@ weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const 
     if (!pose && !options->sensor_geometry)
         weft_note("%s has no camera: the maps stay in sensor geometry", cal_folder);
     weft_err status = solve_on_sensor(set, cal, options, pixel, &to, &run, err);
-    if (status == WEFT_OK)
-        status = require_an_answer(&to, set, err);
     if (status == WEFT_OK && pose && !options->sensor_geometry) {
         const double clock = weft_clock_s();
         status = put_on_plane(&to, cal, options, pixel, err);

@@ -1,161 +1,198 @@
 /*
- * Nanoseconds per pixel of the solver with ten near lights on one core, against
- *   - reading the same bytes from memory once and writing the results (what it could not beat), and
- *   - LAPACKE_dgelsd in double on the same systems, pixel by pixel (the singular value decomposition that
- *     the paper asks for).
+ * Nanoseconds per pixel of the solver with near lights, each figure beside
+ *   - moving the same bytes: every input plane read once, every output plane written once, same threads, and
+ *   - what others do with the same systems: singular values and QR (LAPACK), singular values and the normal
+ *     equations of RelightLab's pattern (Eigen), vectorised NumPy (peers/, built or run only where found).
  * Everything is measured in turn in the same process, minimum of the rounds.
  */
 #include "core/mem.h"
-#include "host/solve/solve_row.h"
+#include "core/parallel.h"
+#include "tests/bench/peers/peer_eigen.h"
+#include "tests/bench/solve_work.h"
 #include "tests/host/dome.h"
 
 #include <lapacke.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-enum { WIDTH = 1232, HEIGHT = 816, N = 10, ROUNDS = 7, LAPACK_PIXELS = 20000 };
+enum { N = 10, ROUNDS = 5, PEER_PIXELS = 20000 };
 
-typedef struct work {
-    weft_calibration cal;
-    weft_incidence incidence;
-    float *in[N][3]; /* [HEIGHT][WIDTH]; a mosaic uses [0] alone */
-    uint8_t *clipped[N];
-    float *out[9];
-    uint8_t *valid, *lights, *quality;
-} work;
+/* ---- the same systems for others: PEER_PIXELS pixels of a row band, rows of L and samples in double ---- */
 
-static work w;
+typedef struct systems {
+    double *rows;    /* [pixels][n][3] */
+    double *samples; /* [pixels][n] */
+    double *normals; /* [pixels][3], ours */
+} systems;
 
-static double now_s(void)
+/* The systems as the solver sees them. */
+static void make_systems(work *w, systems *s)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static float *plane(void)
-{
-    return weft_alloc((size_t)WIDTH * HEIGHT, sizeof(float), NULL);
-}
-
-static void make_work(void)
-{
-    dome_init(&w.cal, WIDTH, HEIGHT);
-    for (int j = 0; j < N; j++) {
-        w.clipped[j] = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
-        for (int c = 0; c < 3; c++) {
-            w.in[j][c] = plane();
-            for (int i = 0; i < WIDTH * HEIGHT; i++)
-                w.in[j][c][i] = (float)(3 + sin(0.01 * i + j + c));
-        }
-    }
-    for (int i = 0; i < 9; i++)
-        w.out[i] = plane();
-    w.valid = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
-    w.lights = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
-    w.quality = weft_alloc((size_t)WIDTH * HEIGHT, 1, NULL);
-}
-
-static double solve_ns(weft_cfa cfa)
-{
-    const weft_solve_plan plan = {&w.incidence, &weft_method_lsq, WIDTH, cfa, 0, NULL, false};
-    const double begin = now_s();
-    for (int v = 0; v < HEIGHT; v++) {
-        const size_t at = (size_t)v * WIDTH;
+    *s = (systems){weft_alloc((size_t)PEER_PIXELS * N * 3, sizeof(double), NULL),
+                   weft_alloc((size_t)PEER_PIXELS * N, sizeof(double), NULL),
+                   weft_alloc((size_t)PEER_PIXELS * 3, sizeof(double), NULL)};
+    const weft_solve_plan plan = {
+        .incidence = &w->incidence, .method = &weft_method_lsq, .width = w->width, .cfa = WEFT_CFA_RGGB};
+    static weft_solve_samples block;
+    const int per_row = w->width / WEFT_SOLVE_LANES * WEFT_SOLVE_LANES;
+    for (int i = 0; i < PEER_PIXELS; i += WEFT_SOLVE_LANES) {
+        const int v = w->height / 2 + i / per_row, u = i % per_row;
+        const size_t at = (size_t)v * (size_t)w->width;
         weft_solve_row_in in[N];
+        weft_solve_answers answers;
         for (int j = 0; j < N; j++)
-            for (int c = 0; c < 3; c++)
-                in[j] = (weft_solve_row_in){
-                    {w.in[j][0] + at, w.in[j][cfa ? 0 : 1] + at, w.in[j][cfa ? 0 : 2] + at},
-                    w.clipped[j] + at,
-                    0.01F,
-                    1e6F,
-                    1e-6F,
-                    1e-4F};
-        const weft_solve_row_out out = {.normal = {w.out[0] + at, w.out[1] + at, w.out[2] + at},
-                                        .albedo = {w.out[3] + at, w.out[4] + at, w.out[5] + at},
-                                        .residual = w.out[6] + at,
-                                        .confidence = w.out[7] + at,
-                                        .angle = w.out[8] + at,
-                                        .lights = w.lights + at,
-                                        .quality = w.quality + at,
-                                        .valid = w.valid + at};
-        weft_solve_row(&plan, v, in, &out);
+            in[j] = (weft_solve_row_in){.rgb = {w->in[j] + at, w->in[j] + at, w->in[j] + at}};
+        weft_solve_gather(&plan, v, u / WEFT_SOLVE_LANES, in, &block);
+        weft_method_lsq.solve(&block, &answers);
+        for (int k = 0; k < WEFT_SOLVE_LANES; k++)
+            for (int j = 0; j < N; j++)
+                for (int c = 0; c < 3; c++) {
+                    s->rows[((size_t)(i + k) * N + (size_t)j) * 3 + (size_t)c] =
+                        (double)block.at[j].light[c][k];
+                    s->samples[(size_t)(i + k) * N + (size_t)j] = (double)block.at[j].grey[k];
+                    s->normals[(size_t)(i + k) * 3 + (size_t)c] = (double)answers.normal[c][k];
+                }
     }
-    return (now_s() - begin) * 1e9 / (WIDTH * HEIGHT);
 }
 
-/* The same planes, read (summed, so that nothing can be left out) and written. */
-static double memory_ns(int channels)
+/* Largest angle between scaled normals and ours, degrees. */
+static double disagreement(const systems *s, const double *scaled)
 {
-    static volatile float sink;
-    float sum[16] = {0};
-    const double begin = now_s();
-    for (int v = 0; v < HEIGHT; v++) {
-        const size_t at = (size_t)v * WIDTH;
-        for (int j = 0; j < N; j++) {
-            for (int c = 0; c < channels; c++)
-                for (int u = 0; u + 16 <= WIDTH; u += 16)
-                    for (int k = 0; k < 16; k++)
-                        sum[k] += w.in[j][c][at + (size_t)(u + k)];
-            for (int u = 0; u + 64 <= WIDTH; u += 64) {
-                uint64_t bytes[8];
-                memcpy(bytes, w.clipped[j] + at + u, 64);
-                sum[0] += (float)(bytes[0] | bytes[3] | bytes[7]);
-            }
-        }
-        for (int i = 0; i < 5 + channels; i++)
-            memset(w.out[i] + at, v & 63, WIDTH * sizeof(float));
-        memset(w.valid + at, 255, WIDTH);
-    }
-    for (int k = 0; k < 16; k++)
-        sink = sum[k];
-    (void)sink;
-    return (now_s() - begin) * 1e9 / (WIDTH * HEIGHT);
+    double worst = 0;
+    for (int i = 0; i < PEER_PIXELS; i++)
+        worst =
+            fmax(worst, dome_angle_deg(scaled + (size_t)3 * (size_t)i, s->normals + (size_t)3 * (size_t)i));
+    return worst;
 }
 
-static double lapack_ns(void)
+static double lapack_ns(const systems *s, bool svd, double *scaled)
 {
-    double rows[N * 3];
-    for (int j = 0; j < N; j++) {
-        const weft_vec3 l = weft_normalise(w.cal.lights[j].position);
-        const double v[3] = {l.x, l.y, l.z};
-        memcpy(rows + 3 * j, v, sizeof v);
-    }
-    const double begin = now_s();
-    for (int i = 0; i < LAPACK_PIXELS; i++) {
+    const double begin = work_now_s();
+    for (size_t i = 0; i < PEER_PIXELS; i++) {
         double a[N * 3], b[N], singular[3];
         int rank;
-        memcpy(a, rows, sizeof a);
-        for (int j = 0; j < N; j++)
-            b[j] = (double)w.in[j][1][i];
-        if (LAPACKE_dgelsd(LAPACK_ROW_MAJOR, N, 3, 1, a, 3, b, 1, singular, 0, &rank) != 0)
+        memcpy(a, s->rows + i * N * 3, sizeof a);
+        memcpy(b, s->samples + i * N, sizeof b);
+        if ((svd ? LAPACKE_dgelsd(LAPACK_ROW_MAJOR, N, 3, 1, a, 3, b, 1, singular, 0, &rank)
+                 : LAPACKE_dgels(LAPACK_ROW_MAJOR, 'N', N, 3, 1, a, 3, b, 1)) != 0)
             return NAN;
+        memcpy(scaled + 3 * i, b, 3 * sizeof *b);
     }
-    return (now_s() - begin) * 1e9 / LAPACK_PIXELS;
+    return (work_now_s() - begin) * 1e9 / PEER_PIXELS;
+}
+
+/* NumPy in a process of its own, on the same systems from a file; NaN where it is not installed. */
+static double numpy_ns(const systems *s, double *worst_deg)
+{
+    char path[] = "/tmp/weft-bench-XXXXXX", command[512];
+    double ns = NAN;
+    const int file = mkstemp(path);
+    if (file < 0)
+        return NAN;
+    FILE *const f = fdopen(file, "wb");
+    fwrite(s->rows, sizeof(double), (size_t)PEER_PIXELS * N * 3, f);
+    fwrite(s->samples, sizeof(double), (size_t)PEER_PIXELS * N, f);
+    fwrite(s->normals, sizeof(double), (size_t)PEER_PIXELS * 3, f);
+    fclose(f);
+    snprintf(command, sizeof command,
+             "/usr/bin/python3 %s/tests/bench/peers/peer_numpy.py %s %d %d 2>/dev/null", WEFT_SOURCE, path,
+             PEER_PIXELS, N);
+    FILE *const pipe = popen(command, "r"); /* a benchmark of a fixed script */
+    if (pipe) {
+        if (fscanf(pipe, "%lf %lf", &ns, worst_deg) != 2)
+            ns = NAN;
+        pclose(pipe);
+    }
+    remove(path);
+    return ns;
+}
+
+/* ---- the table ---- */
+
+typedef struct figures {
+    double move, lsq, robust, search, gloss, svd, demosaic;
+    double dgels, dgelsd, jacobi, relight, numpy;
+    double worst[5];
+} figures;
+
+static void measure_round(work *w, const systems *s, double *scaled, bool peers, figures *f)
+{
+    static const weft_gloss gloss = {0.05F, 0.2F, 0.45F, {{1, 0}, {0, 1}}};
+    work_take_less(&f->move, work_move_ns(w));
+    work_take_less(&f->lsq, work_solve_ns(w, &weft_method_lsq, NULL, false));
+    work_take_less(&f->robust, work_solve_ns(w, &weft_method_robust, NULL, false));
+    work_take_less(&f->search, work_solve_ns(w, &weft_method_robust, NULL, true));
+    if (!peers)
+        return;
+    work_take_less(&f->gloss, work_solve_ns(w, &weft_method_robust, &gloss, false));
+    work_take_less(&f->svd, work_solve_ns(w, &weft_method_svd, NULL, false));
+    work_take_less(&f->dgels, lapack_ns(s, false, scaled));
+    f->worst[0] = disagreement(s, scaled);
+    work_take_less(&f->dgelsd, lapack_ns(s, true, scaled));
+    f->worst[1] = disagreement(s, scaled);
+    if (weft_peer_eigen()) {
+        work_take_less(&f->jacobi, weft_peer_eigen()->jacobi_ns(PEER_PIXELS, N, s->rows, s->samples, scaled));
+        f->worst[2] = disagreement(s, scaled);
+        work_take_less(&f->relight,
+                       weft_peer_eigen()->relight_ns(PEER_PIXELS, N, s->rows, s->samples, scaled));
+        f->worst[3] = disagreement(s, scaled);
+    }
+}
+
+static void print_row(const char *name, double ns, const figures *f, double worst)
+{
+    if (isnan(ns)) {
+        printf("%-44s not found here\n", name);
+        return;
+    }
+    printf("%-44s %9.1f %8.2f %9.1f", name, ns, ns / f->move, ns / f->lsq);
+    if (worst >= 0)
+        printf("   %.1e deg", worst);
+    printf("\n");
+}
+
+static int print_table(void)
+{
+    static work w;
+    systems s;
+    figures f;
+    double *const scaled = weft_alloc((size_t)PEER_PIXELS * 3, sizeof(double), NULL);
+    double *const all = (double *)&f;
+    for (size_t i = 0; i < sizeof f / sizeof *all; i++)
+        all[i] = (double)NAN;
+    work_init(&w, 4928, 3264, N);
+    make_systems(&w, &s);
+    weft_parallel_set_threads(1);
+    for (int round = 0; round < ROUNDS; round++)
+        measure_round(&w, &s, scaled, round < 2, &f);
+    f.numpy = numpy_ns(&s, &f.worst[4]);
+    work_solve_ns(&w, &weft_method_lsq, NULL, false);
+    f.demosaic = work_demosaic_ns(&w);
+    printf("4928 x 3264, ten near lights, one core       %9s %8s %9s   %s\n", "ns/px", "x bytes", "x lsq",
+           "furthest from lsq");
+    print_row("the same bytes read and written", f.move, &f, -1);
+    print_row("lsq", f.lsq, &f, -1);
+    print_row("robust, matte cloth", f.robust, &f, -1);
+    print_row("robust, every pixel searched", f.search, &f, -1);
+    print_row("robust, glossy cloth", f.gloss, &f, -1);
+    print_row("svd", f.svd, &f, -1);
+    print_row("albedo of the sites to three planes", f.demosaic, &f, -1);
+    print_row("Eigen JacobiSVD, double", f.jacobi, &f, f.worst[2]);
+    print_row("Eigen dynamic, normal equations, LDLT", f.relight, &f, f.worst[3]);
+    print_row("LAPACKE dgels", f.dgels, &f, f.worst[0]);
+    print_row("LAPACKE dgelsd", f.dgelsd, &f, f.worst[1]);
+    print_row("NumPy, vectorised, float32 planes", f.numpy, &f, f.worst[4]);
+    weft_free(s.rows);
+    weft_free(s.samples);
+    weft_free(s.normals);
+    weft_free(scaled);
+    work_fini(&w);
+    return 0;
 }
 
 int main(void)
 {
-    double sites = INFINITY, rgb = INFINITY, move_sites = INFINITY, move_rgb = INFINITY, lapack = INFINITY;
-    make_work();
-    if (weft_incidence_init(&w.incidence, &w.cal, WIDTH, HEIGHT, (weft_pixel_scale){1, 0}, 0, NULL) !=
-        WEFT_OK)
-        return 1;
-    for (int round = 0; round < ROUNDS; round++) {
-        sites = fmin(sites, solve_ns(WEFT_CFA_RGGB));
-        move_sites = fmin(move_sites, memory_ns(1));
-        rgb = fmin(rgb, solve_ns(WEFT_CFA_NONE));
-        move_rgb = fmin(move_rgb, memory_ns(3));
-        lapack = fmin(lapack, lapack_ns());
-    }
-    printf("%-34s %8s %10s %10s %8s\n", "ten near lights, one core", "ns/px", "bytes ns", "ratio", "dgelsd");
-    printf("%-34s %8.1f %10.1f %10.2f %7.0fx\n", "lsq, mosaic site by site", sites, move_sites,
-           sites / move_sites, lapack / sites);
-    printf("%-34s %8.1f %10.1f %10.2f %7.0fx\n", "lsq, RGB pictures", rgb, move_rgb, rgb / move_rgb,
-           lapack / rgb);
-    printf("%-34s %8.1f\n", "LAPACKE_dgelsd, grey alone", lapack);
-    return 0;
+    return print_table();
 }

@@ -47,6 +47,14 @@ test -f both/flat.maps/maps.json -a -f both/other.maps/maps.json
 expect 1 'two sets are called flat' "$weft" solve flat.set flat.set/ -c flat.cal -o twice
 test ! -e twice
 
+expect 0 'each light from the others, 768 px' "$weft" check flat.set -c flat.cal --flat --map error.exr
+expect 0 'repeated scan    normal mean 0.0000' "$weft" check flat.set -c flat.cal --repeat other.set
+expect 1 'error.exr' "$weft" check flat.set -c flat.cal --map error.exr
+"$weft" check flat.set -c flat.cal --flat --json | python3 -c '
+import json, sys
+d = json.load(sys.stdin)
+assert len(d["relighting"]["lights"]) == 5 and d["relighting"]["rms_full_scale"] < 1e-3, d
+assert d["flatness"]["rms_deg"] < 0.01, d'
 expect 2 'SET... is missing' "$weft" solve -c flat.cal -o x
 expect 2 '--calibration' "$weft" solve flat.set -o x
 expect 2 'there are: robust, lsq, svd' "$weft" solve flat.set -c flat.cal -o x --method robuster

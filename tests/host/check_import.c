@@ -217,6 +217,34 @@ static void test_transfer_is_found_out(void **state)
     assert_true(!r.srgb && r.misfit_linear < 0.2 * r.misfit_srgb && r.misfit_linear < 0.01);
 }
 
+/* Coded pictures that are called linear all the same are not solved. */
+static void test_coded_pictures_called_linear_are_refused(void **state)
+{
+    (void)state;
+    const weft_solve_options options = {0};
+    weft_import_options import = {.force = true, .transfer = WEFT_IMPORT_LINEAR};
+    weft_import_result r;
+    weft_set set;
+    weft_calibration cal;
+    weft_maps maps = {0};
+    assert_ok(
+        weft_import(weft_test_path("rti/gamma.lp"), weft_test_path("coded.set"), NULL, &import, &r, err));
+    load("coded.set", &set, &cal);
+    assert_fails(weft_solve_set(&set, &cal, weft_test_path("coded.cal"), &options, &maps, err),
+                 WEFT_ERR_FORMAT, "--transfer srgb");
+    assert_null(maps.normal.data);
+    weft_set_fini(&set);
+    weft_calibration_fini(&cal);
+    import.transfer = WEFT_IMPORT_SRGB;
+    assert_ok(
+        weft_import(weft_test_path("rti/gamma.lp"), weft_test_path("coded.set"), NULL, &import, &r, err));
+    load("coded.set", &set, &cal);
+    assert_ok(weft_solve_set(&set, &cal, weft_test_path("coded.cal"), &options, &maps, err));
+    weft_maps_fini(&maps);
+    weft_set_fini(&set);
+    weft_calibration_fini(&cal);
+}
+
 static void test_empty_folder_and_two_lists(void **state)
 {
     (void)state;
@@ -301,6 +329,7 @@ int main(void)
         cmocka_unit_test(test_existing_outputs_are_kept),
         cmocka_unit_test(test_directions_folder),
         cmocka_unit_test(test_transfer_is_found_out),
+        cmocka_unit_test(test_coded_pictures_called_linear_are_refused),
         cmocka_unit_test(test_empty_folder_and_two_lists),
         cmocka_unit_test(test_data_of_others),
     };

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "host/set/compare.h"
+#include "host/solve/relight.h"
 #include "host/solve/solve.h"
 #include "tests/host/dome.h"
 
@@ -198,7 +199,7 @@ static void test_maps_say_how_they_were_made(void **state)
 static void test_mask_and_same_bits(void **state)
 {
     (void)state;
-    static const int threads[] = {1, 2, 7};
+    static const int threads[] = {1, 2, 4};
     weft_mask mask;
     weft_maps maps[3] = {{0}};
     assert_ok(weft_mask_init(&mask, WIDTH, HEIGHT, 255, err));
@@ -207,14 +208,20 @@ static void test_mask_and_same_bits(void **state)
     assert_ok(weft_png_write_mask(weft_test_path("waves.set/mask.png"), &mask, err));
     weft_mask_fini(&mask);
     made.mask_file = weft_strdup("mask.png", NULL);
-    const weft_solve_options options = {.no_bounce = true}; /* the formulas know no light from the walls */
-    for (int i = 0; i < 3; i++) {
-        weft_parallel_set_threads(threads[i]);
-        assert_ok(solve_with(&made, &options, &maps[i], err));
-        const size_t n = weft_image_plane_size(&maps[0].normal);
-        assert_memory_equal(maps[0].normal.data, maps[i].normal.data, 3 * n * sizeof(float));
-        assert_memory_equal(maps[0].albedo.data, maps[i].albedo.data, 3 * n * sizeof(float));
-        assert_memory_equal(maps[0].confidence.data, maps[i].confidence.data, n * sizeof(float));
+    for (int m = 0; weft_solve_methods[m]; m++) {
+        const weft_solve_options options = {.method = weft_solve_methods[m]};
+        for (int i = 0; i < 3; i++) {
+            weft_parallel_set_threads(threads[i]);
+            weft_maps_fini(&maps[i]);
+            assert_ok(solve_with(&made, &options, &maps[i], err));
+            const size_t n = weft_image_plane_size(&maps[0].normal);
+            assert_memory_equal(maps[0].normal.data, maps[i].normal.data, 3 * n * sizeof(float));
+            assert_memory_equal(maps[0].albedo.data, maps[i].albedo.data, 3 * n * sizeof(float));
+            assert_memory_equal(maps[0].confidence.data, maps[i].confidence.data, n * sizeof(float));
+            assert_memory_equal(maps[0].uncertainty.data, maps[i].uncertainty.data, n * sizeof(float));
+            assert_memory_equal(maps[0].lights.data, maps[i].lights.data, n);
+            assert_memory_equal(maps[0].quality.data, maps[i].quality.data, n);
+        }
     }
     weft_parallel_set_threads(0);
     weft_solve_options sensor = {.sensor_geometry = true};
@@ -357,6 +364,71 @@ static void test_distant_lights_need_no_camera(void **state)
                  WEFT_ERR_MISSING, "weft calibrate lens");
 }
 
+/* ---- nonsense ---- */
+
+static void test_lights_in_a_cone_are_refused(void **state)
+{
+    (void)state;
+    weft_calibration narrow = cal;
+    weft_maps maps = {0};
+    const weft_solve_options options = {0};
+    for (int j = 0; j < N; j++)
+        narrow.lights[j].position = (weft_vec3){20 * cos(j), 20 * sin(j), 300};
+    assert_fails(weft_solve_set(&made, &narrow, weft_test_path("dome.cal"), &options, &maps, err),
+                 WEFT_ERR_RANGE, "within 7.6 degrees");
+    for (int j = 0; j < N; j++)
+        narrow.lights[j].position = (weft_vec3){300 * cos(0.3 * (j + 1)), 0, 300 * sin(0.3 * (j + 1))};
+    assert_fails(weft_solve_set(&made, &narrow, weft_test_path("dome.cal"), &options, &maps, err),
+                 WEFT_ERR_RANGE, "in a plane");
+}
+
+/* The set's frames, all but three of them saturated by a lower white level. */
+static void test_three_lights_are_too_few(void **state)
+{
+    (void)state;
+    weft_set three;
+    weft_calibration few = cal;
+    weft_maps maps = {0};
+    const weft_solve_options options = {0};
+    assert_ok(weft_set_load(weft_test_path("waves.set"), &three, err));
+    for (int i = 0, n = 0; i < three.n_frames; i++)
+        if (three.frames[i].role == WEFT_ROLE_LIGHT && three.frames[i].light >= 3)
+            three.frames[i].role = WEFT_ROLE_ALL;
+        else
+            n++;
+    few.n_lights = 3;
+    weft_light_grid none = {0};
+    few.grid = none;
+    assert_fails(weft_solve_set(&three, &few, weft_test_path("dome.cal"), &options, &maps, err),
+                 WEFT_ERR_NODATA, "fewer than four usable lights");
+    assert_null(maps.normal.data);
+    weft_set_fini(&three);
+}
+
+/* ---- relighting ---- */
+
+static void test_lights_predict_each_other(void **state)
+{
+    (void)state;
+    weft_relight r = {0};
+    weft_calibration wrong = cal;
+    weft_solve_options options = {.method = &weft_method_lsq};
+    assert_ok(weft_relight_set(&made, &cal, weft_test_path("dome.cal"), &options, &r, err));
+    print_message("exact light: rms %.5f of full scale, %.5f relative, %zu px\n", r.rms_all, r.relative_all,
+                  r.pixels);
+    assert_true(r.rms_all < 1e-4 && r.relative_all < 1e-3 && r.pixels == (size_t)WIDTH * HEIGHT);
+    assert_true(weft_image_row(&r.map, 0, 50)[70] < 1e-3F);
+    weft_relight_fini(&r);
+    for (int c = 0; c < 3; c++)
+        wrong.lights[3].intensity[c] *= 1.05; /* the lamp has lost a twentieth since */
+    assert_ok(weft_relight_set(&made, &wrong, weft_test_path("dome.cal"), &options, &r, err));
+    for (int j = 0; j < N; j++)
+        print_message("light %d: rms %.4f relative, bias %+.4f\n", j, r.relative[j], r.bias[j]);
+    for (int j = 0; j < N; j++)
+        assert_true(j == 3 ? r.bias[j] > 0.04 && r.bias[j] < 0.06 : fabs(r.bias[j]) < 0.025);
+    weft_relight_fini(&r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -371,6 +443,9 @@ int main(void)
         cmocka_unit_test(test_cancel_leaves_nothing),
         cmocka_unit_test(test_every_failed_allocation_is_an_error),
         cmocka_unit_test(test_distant_lights_need_no_camera),
+        cmocka_unit_test(test_lights_in_a_cone_are_refused),
+        cmocka_unit_test(test_three_lights_are_too_few),
+        cmocka_unit_test(test_lights_predict_each_other),
     };
     return cmocka_run_group_tests(tests, make_set, free_set);
 }
