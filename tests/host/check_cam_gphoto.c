@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "host/camera/camera.h"
 #include "host/camera/gphoto_bodies.h"
+#include "host/camera/gphoto_session.h"
 #include "tests/host/rig_process.h"
 
 #include <dirent.h>
@@ -152,6 +153,33 @@ static void test_bodies_by_name(void **state)
     assert_int_equal(gphoto_find_value(choices, 3, "NEF (Raw)|RAW"), 2);
     assert_int_equal(gphoto_find_value(choices, 3, "NEF|RAW"), 1);
     assert_int_equal(gphoto_find_value(choices, 3, "RA"), -1);
+}
+
+/* Each of libgphoto2's codes is one line that names the camera and what was done. */
+static void test_errors_in_words(void **state)
+{
+    (void)state;
+    static const struct {
+        int code;
+        weft_err status;
+        const char *words;
+    } some[] = {{GP_ERROR_IO_USB_CLAIM, WEFT_ERR_DEVICE, "gio mount -s gphoto2"},
+                {GP_ERROR_IO_USB_FIND, WEFT_ERR_DEVICE, "plug it in"},
+                {GP_ERROR_IO_LOCK, WEFT_ERR_DEVICE, "close that one"},
+                {GP_ERROR_CAMERA_BUSY, WEFT_ERR_TIMEOUT, "access lamp"},
+                {GP_ERROR_NO_SPACE, WEFT_ERR_DEVICE, "empty its card"},
+                {GP_ERROR_TIMEOUT, WEFT_ERR_TIMEOUT, "did not answer"},
+                {-1234, WEFT_ERR_DEVICE, "libgphoto2 error -1234"}};
+    gphoto_session s = {.address = "usb:001,042", .port = "usb:001,042", .words = "said so"};
+    for (size_t i = 0; i < sizeof some / sizeof some[0]; i++)
+        assert_fails(gphoto_fail(&s, some[i].code, "connecting", err), some[i].status, some[i].words);
+    for (int code = -1; code > -130; code--) {
+        weft_error error = {0};
+        assert_true(gphoto_fail(&s, code, "connecting", &error) != WEFT_OK);
+        assert_ptr_equal(strstr(error.text, "camera usb:001,042: connecting: "), error.text);
+        assert_non_null(strstr(error.text, "said so"));
+        assert_null(strchr(error.text, '\n'));
+    }
 }
 
 /* ---- who it is, what it is set to ---- */
@@ -549,6 +577,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_shutter_speeds_as_libgphoto2_writes_them),
         cmocka_unit_test(test_bodies_by_name),
+        cmocka_unit_test(test_errors_in_words),
         ON_RIG(test_opening_releases_nothing_configuring_once),
         ON_RIG(test_settings_are_made),
         ON_RIG(test_what_it_cannot_set_is_refused),
