@@ -10,6 +10,7 @@
 const weft_camera_kind weft_camera_kinds[] = {
     {"aravis", "GigE Vision and USB3 Vision cameras (Aravis)"},
     {"gphoto", "still cameras over USB and PTP/IP (libgphoto2)"},
+    {"libcamera", "Raspberry Pi and other raw sensors (libcamera)"},
     {0},
 };
 
