@@ -1,5 +1,6 @@
 #include "host/cli/command.h"
 #include "host/cli/preview_input.h"
+#include "host/cli/preview_match.h"
 
 #include "core/file.h"
 #include "core/formats/image_file.h"
@@ -10,7 +11,7 @@
 #define LONGEST_SIDE 1600 /* of a plane without --size */
 
 typedef struct preview_args {
-    const char *output, *brdf;
+    const char *output, *brdf, *match, *cal;
     weft_texts params;
     weft_numbers light, light_mm, crop;
     int shape;
@@ -101,6 +102,17 @@ static const weft_field fields[] = {
      .max = 120,
      .def = "0",
      .help = "field of view of the camera; 0 sees everything straight on"},
+    {.key = "match",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(preview_args, match),
+     .unit = "SET",
+     .help = "render each light of this set with --calibration and compare with its photographs"},
+    {.key = "calibration",
+     .short_opt = 'c',
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(preview_args, cal),
+     .unit = "CAL",
+     .help = "where the lights of --match are"},
     {0},
 };
 
@@ -194,7 +206,14 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
     WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     WEFT_TRY(set_light(&view.light, a, err));
     WEFT_TRY(set_crop(&view.crop, &a->crop, err));
+    if (!a->match != !a->cal)
+        return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
     WEFT_TRY(weft_preview_input_load(&input, inv->operands[0], a->brdf, &a->params, err));
+    if (a->match) {
+        const weft_err matched = weft_preview_match(inv, &input, a->match, a->cal, a->output, err);
+        weft_preview_input_fini(&input);
+        return matched;
+    }
     const weft_err status = look(a, &input, &view, &seconds, err);
     weft_preview_input_fini(&input);
     if (status != WEFT_OK)

@@ -7,12 +7,25 @@
 
 #include <string.h>
 
+/* A constant wins over a map that came with the input. */
+static weft_err set_constant(weft_preview_surface *surface, const char *text, weft_error *err)
+{
+    char name[64];
+    int plane = 0;
+    WEFT_TRY(weft_brdf_set(surface->brdf, text, surface->params, err));
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(text, "="), text);
+    const weft_brdf_param *const param = weft_brdf_find_param(surface->brdf, name, &plane);
+    for (int c = 0; param && c < param->components; c++)
+        surface->maps[plane + c] = (weft_preview_map){0};
+    return WEFT_OK;
+}
+
 static weft_err set_param(weft_preview_input *input, const char *text, weft_error *err)
 {
     weft_preview_surface *const surface = &input->surface;
     const char *const equals = strchr(text, '=');
     if (!equals || !weft_file_exists(equals + 1))
-        return weft_brdf_set(surface->brdf, text, surface->params, err);
+        return set_constant(surface, text, err);
     char name[64];
     snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
     weft_image *const image = &input->extra[input->n_extra];

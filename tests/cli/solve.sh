@@ -55,6 +55,22 @@ import json, sys
 d = json.load(sys.stdin)
 assert len(d["relighting"]["lights"]) == 5 and d["relighting"]["rms_full_scale"] < 1e-3, d
 assert d["flatness"]["rms_deg"] < 0.01, d'
+# the maps rendered again under the lights of their set
+expect 0 'match.png: 5 lights' "$weft" preview flat.maps --match flat.set -c flat.cal -o match.png
+"$weft" preview flat.maps --match flat.set -c flat.cal -o dark.png --param albedo=0.25 --json | python3 -c '
+import json, sys
+for row in json.load(sys.stdin)["lights"]:
+    assert abs(row["ratio"] - 0.5) < 1e-3 and row["pixels"] == 768 and 8 < row["psnr_db"] < 20, row'
+"$weft" preview flat.maps --match flat.set -c flat.cal -o same.png --json | python3 -c '
+import json, sys
+for row in json.load(sys.stdin)["lights"]:
+    assert abs(row["ratio"] - 1) < 1e-3 and row["psnr_db"] > 60 and row["psnr_linear_db"] > 60, row'
+expect 2 'go together' "$weft" preview flat.maps --match flat.set -o x.png
+expect 1 'absent.set' "$weft" preview flat.maps --match absent.set -c flat.cal -o x.png
+"$WEFT_TEST_BUILD/tests/make-weave-maps" other-sensor.maps sensor
+expect 1 'do not belong together' "$weft" preview other-sensor.maps --match flat.set -c flat.cal -o x.png
+test ! -e x.png
+
 expect 2 'SET... is missing' "$weft" solve -c flat.cal -o x
 expect 2 '--calibration' "$weft" solve flat.set -o x
 expect 2 'there are: robust, lsq, svd' "$weft" solve flat.set -c flat.cal -o x --method robuster
