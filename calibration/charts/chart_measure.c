@@ -126,7 +126,8 @@ static double unevenness_of(const block_means *b, const weft_robust_mean *m)
     for (int k = 0; k < N_BLOCKS; k++) {
         if (isnan(b->mean[k]))
             continue;
-        const double x = k % BLOCKS - 1.5, y = k / BLOCKS - 1.5, d = b->mean[k] - m->mean;
+        const int column = k % BLOCKS, row = k / BLOCKS;
+        const double x = column - 1.5, y = row - 1.5, d = b->mean[k] - m->mean;
         s0 += d;
         sx += x * d;
         sy += y * d;
@@ -137,7 +138,8 @@ static double unevenness_of(const block_means *b, const weft_robust_mean *m)
     if (n < N_BLOCKS || !(m->mean > 0)) /* too small a patch to say */
         return 0;
     for (int k = 0; k < N_BLOCKS; k++) {
-        const double x = k % BLOCKS - 1.5, y = k / BLOCKS - 1.5;
+        const int column = k % BLOCKS, row = k / BLOCKS;
+        const double x = column - 1.5, y = row - 1.5;
         const double d = b->mean[k] - m->mean - s0 / n - (sx * x + sy * y) / xx;
         square += d * d;
     }

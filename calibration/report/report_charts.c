@@ -245,7 +245,7 @@ static void plot_chart(const weft_calibration *cal, const json_t *report, weft_t
     const weft_chart *chart;
     if (weft_chart_find(weft_report_text(report, "chart"), weft_report_text(report, "edition"), &chart,
                         NULL) != WEFT_OK ||
-        json_array_size(patches) != (size_t)(chart->columns * chart->rows))
+        (int)json_array_size(patches) != chart->columns * chart->rows)
         return;
     weft_plot plot;
     const weft_plot_spec spec = {.title = "The chart",
@@ -257,9 +257,10 @@ static void plot_chart(const weft_calibration *cal, const json_t *report, weft_t
                                  .no_ticks = true};
     weft_report_figure_begin(page);
     weft_plot_begin(&plot, &spec, page);
-    for (int p = 0; p < chart->columns * chart->rows; p++)
-        draw_patch(&plot, &cal->colour.model, json_array_get(patches, (size_t)p), p % chart->columns,
-                   p / chart->columns);
+    for (int p = 0; p < chart->columns * chart->rows; p++) {
+        const int column = p % chart->columns, row = p / chart->columns;
+        draw_patch(&plot, &cal->colour.model, json_array_get(patches, (size_t)p), column, row);
+    }
     weft_plot_end(&plot);
     weft_report_figure_end(
         page, "Outside the colour as it should be, inside as it comes out, below it CIEDE2000 of the patch "

@@ -23,7 +23,8 @@ static int log_ticks(const weft_plot_axis *axis, double *ticks)
     const double decades = log10(axis->max / axis->min);
     static const double parts[3] = {1, 2, 5};
     int n = 0;
-    for (double e = floor(log10(axis->min)); e <= log10(axis->max); e++)
+    const int last = (int)floor(log10(axis->max));
+    for (int e = (int)floor(log10(axis->min)); e <= last; e++)
         for (int k = 0; k < (decades > 4 ? 1 : 3) && n < TICKS_MAX; k++) {
             const double at = parts[k] * pow(10, e);
             if (at >= axis->min * (1 - 1e-9) && at <= axis->max * (1 + 1e-9))
