@@ -149,7 +149,7 @@ static void row(weft_text_buffer *page, const char *name, double value, double s
 
 static void table(const weft_camera *c, const json_t *lens, weft_text_buffer *page)
 {
-    static const char *const names[] = {"k1", "k2", "p1", "p2", "k3"};
+    static const char *const names[WEFT_DISTORTION] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
     const json_t *const sigma = json_object_get(lens, "sigma"), *const bent =
                                                                     json_object_get(sigma, "distortion");
     weft_text_add(page, "<table>\n");
@@ -157,12 +157,34 @@ static void table(const weft_camera *c, const json_t *lens, weft_text_buffer *pa
     row(page, "fy", c->fy, weft_report_number(sigma, "fy"), "px");
     row(page, "cx", c->cx, weft_report_number(sigma, "cx"), "px");
     row(page, "cy", c->cy, weft_report_number(sigma, "cy"), "px");
-    for (size_t i = 0; i < 5; i++)
-        row(page, names[i], c->distortion[i], weft_report_item(bent, i), "");
+    for (size_t i = 0; i < WEFT_DISTORTION; i++)
+        if (i < 5 || c->distortion[i] != 0)
+            row(page, names[i], c->distortion[i], weft_report_item(bent, i), "");
     row(page, "rms", c->rms_px, (double)NAN, "px");
     if (!isnan(weft_report_number(lens, "held_out_px")))
         row(page, "held out", weft_report_number(lens, "held_out_px"), (double)NAN, "px");
     weft_text_add(page, "</table>\n");
+}
+
+/* The models that were tried; the one with the least held-out error was taken. */
+static void tried_table(const json_t *lens, weft_text_buffer *page)
+{
+    const json_t *const tried = json_object_get(lens, "tried");
+    if (json_array_size(tried) == 0)
+        return;
+    weft_text_add(page, "<table><tr><th>model of the lens</th><th>board</th><th>held out, px</th></tr>\n");
+    for (size_t i = 0; i < json_array_size(tried); i++) {
+        const json_t *const one = json_array_get(tried, i);
+        weft_text_add(page, "<tr><td>");
+        weft_text_add_escaped(page, weft_report_text(one, "model"));
+        weft_text_add(page, "</td><td>%s</td>", json_is_true(json_object_get(one, "bent")) ? "bent" : "flat");
+        weft_report_cell(page, 4, weft_report_number(one, "held_out_px"));
+        weft_text_add(page, "</tr>\n");
+    }
+    weft_text_add(page, "</table>\n<p class=\"soft\">Taken: ");
+    weft_text_add_escaped(page, weft_report_text(lens, "model"));
+    weft_text_add(page, ", %s board.</p>\n",
+                  json_is_true(json_object_get(lens, "board_bent")) ? "bent" : "flat");
 }
 
 void weft_report_lens(const weft_calibration *cal, weft_text_buffer *page)
@@ -175,6 +197,7 @@ void weft_report_lens(const weft_calibration *cal, weft_text_buffer *page)
         return;
     }
     table(&cal->camera, lens, page);
+    tried_table(lens, page);
     if (json_array_size(views) == 0) {
         weft_report_absent(page, "The calibration does not say from which pictures the lens was made.", NULL);
         return;

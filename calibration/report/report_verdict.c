@@ -47,7 +47,9 @@ static void judge_views(const json_t *lens, weft_verdict *v)
         if (!json_is_false(json_object_get(view, "used")))
             continue;
         const size_t n = strlen(names);
-        snprintf(names + n, sizeof names - n, "%s%s", dropped++ ? ", " : "", weft_report_text(view, "image"));
+        const char *const why = weft_report_text(view, "left_out");
+        snprintf(names + n, sizeof names - n, "%s%s%s%s%s", dropped++ ? ", " : "",
+                 weft_report_text(view, "image"), why[0] ? " (" : "", why, why[0] ? ")" : "");
     }
     if (dropped)
         add(v, WEFT_GRADE_FAIR, "lens",
@@ -82,6 +84,10 @@ static void judge_lens(const weft_calibration *cal, weft_verdict *v)
         add(v, grade_of(sigma, 0.001, 0.01), "lens", "Tilt the board more: only tilt tells the focal length.",
             "The focal length is known to %.3f %%.", 100 * sigma);
     judge_views(lens, v);
+    const double bend = fabs(weft_report_number(lens, "board_bend_mm"));
+    if (json_is_true(json_object_get(lens, "board_bent")))
+        add(v, grade_of(bend, 0.3, 1.5), "lens", "Glue the board to glass or aluminium.",
+            "The board is bent by %.2f mm; this is taken into account.", bend);
     if (!cal->camera.has_pose)
         add(v, WEFT_GRADE_ABSENT, "pose", "weft calibrate lens --board-on-table table.set -o CAL",
             "The camera's place over the table is not known.");

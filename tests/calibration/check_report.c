@@ -164,8 +164,10 @@ static void test_what_is_bad_is_named(void **state)
     cal.colour.delta_e_mean = 0.5;
     cal.colour.delta_e_held_out_mean = 5.4;
     report(&cal, "lens",
-           "{\"held_out_px\":2.5,\"coverage\":0.3,\"sigma\":{\"fx\":90},\"views\":[{\"image\":\"<b>bold\","
-           "\"rms_px\":9,\"used\":false}]}");
+           "{\"held_out_px\":2.5,\"coverage\":0.3,\"sigma\":{\"fx\":90},\"board_bent\":true,\"board_bend_"
+           "mm\":-0.8,\"model\":\"<b>bold\",\"tried\":[{\"model\":"
+           "\"k1\",\"held_out_px\":0.1},3],\"views\":[{\"image\":\"<b>bold\","
+           "\"rms_px\":9,\"used\":false,\"left_out\":\"blurred\"}]}");
     report(&cal, "lights",
            "{\"settled\":false,\"rounds\":[{},{}],\"sheet\":{\"bow_mm\":[1.5,0.1],\"bow_sigma_mm\":[0.1,0.1],"
            "\"tilt_rad\":[0.005,0],\"tilt_sigma_rad\":[0.001,0.001],\"bow_used\":true}}");
@@ -179,6 +181,8 @@ static void test_what_is_bad_is_named(void **state)
     assert_grade(&v, "lens", "30 %", WEFT_GRADE_REDO);
     assert_grade(&v, "lens", "1.875 %", WEFT_GRADE_REDO);
     assert_grade(&v, "lens", "left out: <b>bold", WEFT_GRADE_FAIR);
+    assert_grade(&v, "lens", "bent by 0.80 mm", WEFT_GRADE_FAIR);
+    assert_grade(&v, "lens", "<b>bold (blurred)", WEFT_GRADE_FAIR);
     assert_grade(&v, "lights", "had not settled", WEFT_GRADE_REDO);
     assert_grade(&v, "lights", "2.00 % at most (light 1)", WEFT_GRADE_REDO);
     assert_grade(&v, "lights", "light 0: +- 12.0 mm", WEFT_GRADE_FAIR);
