@@ -111,9 +111,11 @@ typedef struct text {
 
 static weft_err append(text *t, const char *bytes, size_t n, weft_error *err)
 {
+    if (n == 0)
+        return WEFT_OK;
     if (t->n + n + 1 > REPLY_LIMIT)
         return weft_fail(err, WEFT_ERR_PROTOCOL, "the daemon's reply has no end");
-    if (t->n + n + 1 > t->room) {
+    if (!t->bytes || t->n + n + 1 > t->room) {
         const size_t room = 2 * (t->n + n + 1);
         char *const grown = weft_realloc(t->bytes, room, 1, err);
         if (!grown)

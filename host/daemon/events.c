@@ -9,7 +9,7 @@
 #include <string.h>
 
 enum { RING = 4096 };
-#define RING_BYTES ((size_t)8 << 20)
+#define RING_BYTES ((size_t)1 << 20)
 
 struct weft_events {
     int64_t epoch;

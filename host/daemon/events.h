@@ -1,5 +1,5 @@
 /**
- * What happened, for any number of watchers: the last few thousand events in a ring.
+ * What happened, for any number of watchers: the last few thousand events, or megabyte of them, in a ring.
  *
  * A watcher holds a position and reads at its own pace; one that falls behind the ring's tail has lost events
  * and is let go.  Nobody is waited for and nothing is kept per watcher.

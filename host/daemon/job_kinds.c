@@ -15,7 +15,7 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "light status", .hardware = true, .by_hand = true},
     {.command = "live", .hardware = true, .by_hand = true, .writes = "output", .texts = "lights"},
     {.command = "capture", .hardware = true, .resumes = true, .writes = "*", .texts = "lights|exposure|name|trigger"},
-    {.command = "calibrate lens", .reads = "*|board-on-table", .writes = "output"},
+    {.command = "calibrate lens", .reads = "*|board-on-table", .writes = "output", .texts = "model|bent"},
     {.command = "calibrate linearity", CHART},
     {.command = "calibrate white", CHART},
     {.command = "calibrate lights", .reads = "*|guess|positions", .writes = "output"},

@@ -185,6 +185,15 @@ static void on_line(void *context, const char *stream, const char *text)
     r->n_lines++;
 }
 
+/* That there is a picture; its histogram is for those who ask. */
+static void tell_picture(const running_job *r, const json_t *info)
+{
+    json_t *const data = json_copy((json_t *)(uintptr_t)info);
+    json_object_del(data, "histogram");
+    json_object_set_new(data, "number", json_integer((json_int_t)r->queue->live->number));
+    weft_events_add(r->queue->events, "live", r->job.id, data);
+}
+
 static void on_report(void *context, json_t *message, int picture)
 {
     running_job *const r = context;
@@ -203,7 +212,7 @@ static void on_report(void *context, json_t *message, int picture)
         if (weft_live_take(r->queue->live, info, picture, &error) != WEFT_OK)
             weft_warn("job %" PRId64 ": %s", r->job.id, error.text);
         else
-            weft_events_add(r->queue->events, "live", r->job.id, json_deep_copy(info));
+            tell_picture(r, info);
     }
     if (picture >= 0)
         close(picture);

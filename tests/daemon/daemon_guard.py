@@ -10,7 +10,7 @@ import subprocess
 import threading
 import time
 
-from weftd import BIN, SLOW, Watcher, Weftd, children, make_flat, run_tests, scratch
+from weftd import BIN, SLOW, SOURCE, Watcher, Weftd, children, make_flat, run_tests, scratch
 
 
 def raw(d, data, timeout=20, tcp=None):
@@ -114,6 +114,31 @@ def test_tls():
                     got += chunk
             assert b" 200 " in got.split(b"\r\n")[0] and b'"name":"weftd"' in got, got
             assert b" 200 " not in raw(d, b"GET /v1 HTTP/1.0\r\nHost: localhost\r\n\r\n", tcp=("127.0.0.1", port))
+
+
+def test_command_line():
+    def run(*words):
+        return subprocess.run([f"{BIN}/weftd", *words], capture_output=True, text=True, check=False)
+    helped = run("--help")
+    assert helped.returncode == 0 and helped.stdout.startswith("weftd: "), helped
+    with open(f"{SOURCE}/docs/daemon.md", encoding="utf-8") as page:
+        text = page.read()
+    for option in ("--library", "--socket", "--group", "--listen", "--token", "--host", "--tls-cert", "--tls-key", "--cpu-jobs"):
+        assert option in helped.stdout and option in text, option
+    for words, told in (((), "--library is needed"), (("--libary", "x"), "did you mean --library"),
+                        (("--library", "x", "y"), "options only"), (("--library", "x", "--cpu-jobs", "0"), "1 to 16")):
+        ended = run(*words)
+        assert ended.returncode == 2 and told in ended.stderr, ended
+    with scratch() as folder:
+        for words, told in ((("--library", f"{folder}/none"), "there is no such folder"),
+                            (("--library", folder, "--socket", f"{folder}/{'x' * 120}"), "shorter --socket"),
+                            (("--library", folder, "--socket", f"{folder}/s", "--listen", "example.com:80"), "wanted an address"),
+                            (("--library", folder, "--socket", f"{folder}/s", "--tls-cert", "x"), "go together"),
+                            (("--library", folder, "--socket", f"{folder}/s", "--group", "nobody-has-it"), "no such group"),
+                            (("--library", folder, "--socket", f"{folder}/s", "--rig", f"{folder}/none"), "--rig")):
+            ended = run(*words)
+            assert ended.returncode in (1, 2) and told in ended.stderr and ended.stderr.count("\n") <= 4, (words, ended)
+            assert not os.path.exists(f"{folder}/s"), "a socket is left"
 
 
 def test_mode_of_the_socket():

@@ -1,6 +1,6 @@
 """weftd with the virtual scanner: captures as jobs, weft through the daemon, the live view, kill -9 of the daemon.
 
-WEFT_KILLS is how many times the daemon is killed (default 3)."""
+WEFT_KILLS is how many times the daemon is killed (default 2)."""
 import json
 import os
 import random
@@ -10,7 +10,7 @@ import time
 
 from weftd import BIN, SLOW, Rig, Watcher, Weftd, alive, check_set, children, run_tests, scratch
 
-KILLS = int(os.environ.get("WEFT_KILLS", "3"))
+KILLS = int(os.environ.get("WEFT_KILLS", "2"))
 
 
 def frames_of(folder):
