@@ -82,7 +82,7 @@ void weft_board_grey(const weft_image *image, weft_cfa cfa, uint8_t *grey);
  * Median width of the edges of the squares: contrast over the steepest slope, px.  A sharp picture has 1
  * to 4.
  *
- * @param share  gets it as a share of the corners' spacing; beyond 0.3 corners lose their place
+ * @param share  gets it as a share of the corners' spacing; beyond 0.2 corners lose their place
  */
 double weft_board_edge_width(const uint8_t *grey, int width, int height, const weft_board *board,
                              const float *corners, double *share);

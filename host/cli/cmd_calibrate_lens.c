@@ -14,7 +14,7 @@
 #include <math.h>
 #include <string.h>
 
-#define BLUR_MOST 0.3 /* width of an edge over a square's */
+#define BLUR_MOST 0.2 /* width of an edge over a square's */
 
 typedef struct lens_args {
     const char *output, *on_table;
@@ -213,7 +213,7 @@ static weft_err fit_pose(lens_run *run, weft_error *err)
     if (!found)
         return weft_fail(
             err, WEFT_ERR_NODATA,
-            "%s: no board of %dx%d inner corners in it; all of the board must be seen, flat on the table",
+            "%s: no board of %dx%d inner corners in it; all of the board must be seen, sharp and flat on the table",
             path, run->board.columns, run->board.rows);
     WEFT_TRY(weft_calibration_require_size(&run->cal, run->width, run->height, run->args->output, err));
     return weft_lens_fit_pose(&run->board, &view, run->args->origin_mm.values, &run->cal.camera,

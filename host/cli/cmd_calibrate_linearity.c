@@ -1,5 +1,6 @@
 #include "host/cli/chart_session.h"
 #include "host/cli/command.h"
+#include "host/cli/sensor_report.h"
 
 #include "calibration/calibration_report.h"
 #include "calibration/charts/linearity.h"
@@ -212,6 +213,26 @@ static json_t *report(const weft_chart_session *session, const weft_chart_option
     return r;
 }
 
+static void print_noise(const weft_invocation *inv, const json_t *noise)
+{
+    size_t site;
+    const json_t *c;
+    json_array_foreach((json_t *)noise, site, c) /* does not change it: Jansson's macro lacks the const */
+    {
+        const json_t *const saturation = json_object_get(c, "saturation_dn");
+        fprintf(inv->out, "%-6s black %.1f DN, %.3f +- %.3f e/DN, read noise %.1f e, fixed pattern %.2f %%, ",
+                weft_site_names[site], json_number_value(json_object_get(c, "black_dn")),
+                json_number_value(json_object_get(c, "gain_e_per_dn")),
+                json_number_value(json_object_get(c, "gain_sigma")),
+                json_number_value(json_object_get(c, "read_noise_e")),
+                100 * json_number_value(json_object_get(c, "fixed_pattern")));
+        if (json_is_null(saturation))
+            fputs("saturation not reached\n", inv->out);
+        else
+            fprintf(inv->out, "saturates at %.0f DN\n", json_number_value(saturation));
+    }
+}
+
 static weft_err print(const weft_invocation *inv, const weft_chart_session *session, const judgement *j,
                       weft_error *err)
 {
@@ -225,6 +246,7 @@ static weft_err print(const weft_invocation *inv, const weft_chart_session *sess
     if (j->n_series)
         fprintf(inv->out, "exposure series: off by %.3f %% of the range at most (%d lights)\n",
                 100 * j->series.max_deviation, j->n_series);
+    print_noise(inv, json_object_get(weft_calibration_get_report(&session->cal, "linearity"), "noise"));
     return WEFT_OK;
 }
 
@@ -249,8 +271,14 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
             session.cal.linearity.range[0] = fmax(fmin(j.linearity.range[0], j.series.range[0]), 0);
         }
         session.cal.has_linearity = true;
-        status =
-            weft_calibration_set_report(&session.cal, "linearity", report(&session, &args->chart, &j), err);
+        json_t *noise = NULL, *const told = report(&session, &args->chart, &j);
+        status = weft_sensor_report(&session.set, j.n_series ? j.series.offset : NULL, &noise, err);
+        if (noise)
+            json_object_set_new(told, "noise", noise);
+        if (status == WEFT_OK)
+            status = weft_calibration_set_report(&session.cal, "linearity", told, err);
+        else
+            json_decref(told);
     }
     if (status == WEFT_OK)
         status = weft_chart_session_save(&session, &args->chart, NULL, err);
