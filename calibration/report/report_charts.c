@@ -68,17 +68,27 @@ static void plot_deviation(const json_t *greys, weft_text_buffer *page)
     weft_report_figure_end(page, "Dashed: what the nominal values of the chips allow (10 % below N4).");
 }
 
-/* Points [[value, deviation], ...] of a channel. */
-static int noise_points(const json_t *channel, double *x, double *y, int room)
+/* Level over black and variance of a class of photosites. */
+static int noise_points(const json_t *class, double *x, double *y, int room)
 {
-    const json_t *const points = json_object_get(channel, "points");
+    const json_t *const levels = json_object_get(class, "level_dn");
+    const json_t *const variances = json_object_get(class, "variance_dn2");
     int n = 0;
-    for (size_t i = 0; i < json_array_size(points) && n < room; i++) {
-        x[n] = weft_report_item(json_array_get(points, i), 0);
-        y[n] = weft_report_item(json_array_get(points, i), 1);
+    for (size_t i = 0; i < json_array_size(levels) && n < room; i++) {
+        x[n] = weft_report_item(levels, i);
+        y[n] = weft_report_item(variances, i);
         n += x[n] > 0 && y[n] > 0;
     }
     return n;
+}
+
+/* What was fitted: read noise, shot noise, fixed pattern, and the rounding to whole DN. */
+static double fitted_variance(const json_t *class, double level)
+{
+    const double gain = weft_report_number(class, "gain_e_per_dn");
+    const double read = weft_report_number(class, "read_noise_e") / gain;
+    const double pattern = weft_report_number(class, "fixed_pattern");
+    return read * read + level / gain + (isnan(pattern) ? 0 : pattern * pattern * level * level) + 1 / 12.0;
 }
 
 static void plot_noise(const json_t *channels, weft_text_buffer *page)
@@ -108,27 +118,31 @@ static void plot_noise(const json_t *channels, weft_text_buffer *page)
         const json_t *const channel = json_array_get(channels, (size_t)c);
         const int n = noise_points(channel, x, y, MOST);
         weft_plot_dots(&plot, site_series[c], 2.5, n, x, y, site_names[c]);
-        const double gain = weft_report_number(channel, "gain_e_per_dn"),
-                     read = weft_report_number(channel, "read_noise_dn");
         for (int i = 0; i < 60; i++) {
             x[i] = low[0] * pow(high[0] / low[0], i / 59.0);
-            y[i] = x[i] / gain + read * read;
+            y[i] = fitted_variance(channel, x[i]);
         }
         weft_plot_line(&plot, site_series[c], 60, x, y, NULL);
     }
     weft_plot_end(&plot);
     weft_report_figure_end(
-        page, "Variance of a photosite against its signal, and the straight line of shot noise over read "
-              "noise that was fitted to it.");
+        page, "Variance of a photosite against its signal, and the sum of read noise, shot noise and "
+              "fixed pattern that was fitted to it.");
 }
 
 static void noise_table(const json_t *channels, weft_text_buffer *page)
 {
-    weft_text_add(page, "<table><tr><th>photosites</th><th>gain, e-/DN</th><th>read noise, DN</th></tr>\n");
+    static const char *const keys[] = {"black_dn", "gain_e_per_dn", "gain_sigma", "read_noise_e"};
+    weft_text_add(page,
+                  "<table><tr><th>photosites</th><th>black, DN</th><th>gain, e-/DN</th><th>&plusmn;</th>"
+                  "<th>read noise, e-</th><th>fixed pattern, %%</th><th>saturates at, DN</th></tr>\n");
     for (size_t c = 0; c < json_array_size(channels) && c < 4; c++) {
+        const json_t *const one = json_array_get(channels, c);
         weft_text_add(page, "<tr><td>%s</td>", site_names[c]);
-        weft_report_cell(page, 3, weft_report_number(json_array_get(channels, c), "gain_e_per_dn"));
-        weft_report_cell(page, 3, weft_report_number(json_array_get(channels, c), "read_noise_dn"));
+        for (int k = 0; k < 4; k++)
+            weft_report_cell(page, k == 0 ? 1 : 3, weft_report_number(one, keys[k]));
+        weft_report_cell(page, 2, 100 * weft_report_number(one, "fixed_pattern"));
+        weft_report_cell(page, 0, weft_report_number(one, "saturation_dn"));
         weft_text_add(page, "</tr>\n");
     }
     weft_text_add(page, "</table>\n");
@@ -138,7 +152,7 @@ void weft_report_linearity(const weft_calibration *cal, weft_text_buffer *page)
 {
     const json_t *const report = weft_calibration_get_report(cal, "linearity");
     const json_t *const greys = json_object_get(report, "greys");
-    const json_t *const noise = json_object_get(weft_calibration_get_report(cal, "noise"), "channels");
+    const json_t *const noise = json_object_get(report, "noise");
     weft_text_add(page, "<h2>Linearity and noise</h2>\n");
     if (!cal->has_linearity) {
         weft_report_absent(page, "Not checked: ", "weft calibrate linearity munsell.set -o CAL");

@@ -143,8 +143,9 @@ static void judge_sheet(const json_t *sheet, weft_verdict *v)
     if (!sheet)
         return;
     add(v, grade_of(bow, 0.2, 1), "lights", "Stretch the sheet over a flat plate, or glue it to one.",
-        bow > 0 ? "The sheet was bowed by %.2f mm." : "No bow of the sheet can be told from none (%.2f mm).",
-        bow);
+        bow > 0 ? "The sheet was bowed by %.2f mm."
+                : "The sheet was flat, as far as can be told (+- %.2f mm).",
+        bow > 0 ? bow : unsure);
     if (tilt > 0)
         add(v, grade_of(tilt, 0.003, 0.009), "lights",
             "The sheet must lie where the board lay: on the plate.",

@@ -133,15 +133,21 @@ static void test_what_is_good_needs_no_remedy(void **state)
            "{\"moved_mm\":0.05,\"rms\":0.0015}],\"lights\":[]}");
     report(&cal, "linearity",
            "{\"series\":{\"max_deviation\":0.001},\"greys\":[{\"reflectance\":0.9,\"deviation\":[0,0,"
-           "0,0.01]},{\"reflectance\":0.05,\"deviation\":[0.01,0,0,0]}]}");
-    report(&cal, "noise",
-           "{\"channels\":[{\"gain_e_per_dn\":2,\"read_noise_dn\":1.5,\"points\":[[100,52],[5000,2501]]}]}");
+           "0,0.01]},{\"reflectance\":0.05,\"deviation\":[0.01,0,0,0]}],\"noise\":[{\"gain_e_per_dn\":2,"
+           "\"read_noise_e\":3,\"fixed_pattern\":0.003,\"black_dn\":256,\"saturation_dn\":null,"
+           "\"level_dn\":[100,5000],\"variance_dn2\":[52,2501]}]}");
     report(&cal, "white", "{\"lights\":[{\"difference_from_sheet\":0.002}]}");
     weft_report_judge(&cal, &v);
     for (int i = 0; i < v.n; i++)
         assert_int_equal(v.findings[i].grade, WEFT_GRADE_GOOD);
     assert_true(v.n >= 9);
     check_page(&cal, "good.cal", NULL);
+    char *text;
+    size_t n_text;
+    assert_ok(weft_file_read(weft_test_path("page.html"), 1 << 24, &text, &n_text, err));
+    assert_non_null(strstr(text, "variance, DN^2"));
+    assert_non_null(strstr(text, "The Munsell line"));
+    weft_free(text);
 
     weft_white_sheet sheet;
     assert_ok(weft_white_sheet_init(&sheet, 1232, 816, 2, err));
@@ -220,8 +226,9 @@ static void test_reports_of_the_wrong_types(void **state)
     weft_calibration cal = good();
     report(&cal, "lens", "{\"views\":7,\"sigma\":[],\"coverage\":\"much\",\"held_out_px\":null}");
     report(&cal, "lights", "{\"rounds\":[1,\"two\",null],\"lights\":{\"a\":1},\"settled\":3}");
-    report(&cal, "linearity", "{\"greys\":[[],{\"deviation\":3}],\"series\":\"none\"}");
-    report(&cal, "noise", "{\"channels\":[{\"points\":[1,[2],[\"a\",3]]},5]}");
+    report(&cal, "linearity",
+           "{\"greys\":[[],{\"deviation\":3}],\"series\":\"none\",\"noise\":[{\"level_dn\":[1,\"a\"],"
+           "\"variance_dn2\":7},5]}");
     report(&cal, "colour", "{\"chart\":7,\"patches\":[1,2,3]}");
     check_page(&cal, "odd.cal", NULL);
     weft_calibration_fini(&cal);

@@ -441,6 +441,12 @@ static void test_refusals_leave_the_calibration_alone(void **state)
     assert_int_equal(runf("weft calibrate colour %s -o %s", weft_test_path("over.set"), folder),
                      1); /* clipped */
     assert_int_equal(runf("weft calibrate colour %s -o %s --edition 1976", macbeth, folder), 2);
+    weft_calibration other; /* of a camera with other frames */
+    assert_ok(weft_calibration_load(folder, &other, err));
+    other.camera.width *= 2;
+    assert_ok(weft_calibration_save(weft_test_path("other.cal"), &other, err));
+    weft_calibration_fini(&other);
+    assert_int_equal(runf("weft calibrate colour %s -o %s", macbeth, weft_test_path("other.cal")), 1);
     assert_int_equal(runf("weft calibrate colour %s -o %s --corners 1,2,3", macbeth, folder), 2);
     assert_int_equal(
         runf("weft calibrate colour %s -o %s --overlay %s", macbeth, folder, weft_test_path("overlay.png")),
