@@ -1,7 +1,9 @@
 /* weft devices: what there is, and why one cannot be used. */
 #include "core/mem.h"
+#include "core/progress.h"
 #include "host/cli/command.h"
 #include "host/cli/device_open.h"
+#include "host/usb/usb_devices.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -10,10 +12,15 @@ enum { MAX_DEVICES = 32 };
 
 typedef struct devices_args {
     weft_device_options devices;
+    bool watch;
 } devices_args;
 
 static const weft_field devices_fields[] = {
     WEFT_DEVICE_FIELDS(devices_args, devices),
+    {.key = "watch",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(devices_args, watch),
+     .help = "tell what is plugged in and out over USB, a line each, until Ctrl-C; nothing is opened"},
     {0},
 };
 
@@ -73,6 +80,34 @@ static weft_err try_ports(found_devices *found, weft_error *err)
     return WEFT_OK;
 }
 
+static bool is_listed(const found_devices *found, const weft_usb_device *usb)
+{
+    for (int i = 0; i < found->n_cameras; i++)
+        if (usb->serial[0] && strcmp(found->cameras[i].serial, usb->serial) == 0)
+            return true;
+    return false;
+}
+
+/* Cameras on USB that no library could open, and so did not list: why. */
+static weft_err add_locked_cameras(found_devices *found, weft_error *err)
+{
+    weft_usb_device usb[MAX_DEVICES];
+    int n = 0;
+    WEFT_TRY(weft_usb_list(usb, MAX_DEVICES, &n, err));
+    for (int i = 0; i < n && found->n_cameras < MAX_DEVICES; i++) {
+        if (usb[i].kind == WEFT_USB_CONTROLLER || !usb[i].problem[0] || is_listed(found, &usb[i]))
+            continue;
+        weft_camera_found *const f = &found->cameras[found->n_cameras++];
+        *f = (weft_camera_found){0};
+        snprintf(f->id, sizeof f->id, "usb:%s", usb[i].identity);
+        snprintf(f->vendor, sizeof f->vendor, "%s", weft_usb_kind_name(usb[i].kind));
+        snprintf(f->model, sizeof f->model, "%.63s", usb[i].name);
+        snprintf(f->serial, sizeof f->serial, "%.63s", usb[i].serial);
+        snprintf(f->problem, sizeof f->problem, "%.255s", usb[i].problem);
+    }
+    return WEFT_OK;
+}
+
 /* What was named is tried and nothing else; without a name everything is looked for. */
 static weft_err find_devices(const weft_device_options *options, found_devices *found, weft_error *err)
 {
@@ -81,6 +116,8 @@ static weft_err find_devices(const weft_device_options *options, found_devices *
     WEFT_TRY(weft_device_options_resolve(options, &names, err));
     if (all)
         WEFT_TRY(weft_camera_list(found->cameras, MAX_DEVICES, &found->n_cameras, err));
+    if (all)
+        WEFT_TRY(add_locked_cameras(found, err));
     else if (options->rig || options->camera)
         try_camera(names.camera, found);
     if (all)
@@ -133,9 +170,45 @@ static void print_devices(const found_devices *found, FILE *out)
     }
 }
 
+static weft_err tell_event(const weft_invocation *inv, bool appeared, const weft_usb_device *d,
+                           weft_error *err)
+{
+    const char *const what = appeared ? "appeared" : "vanished";
+    if (inv->json)
+        return weft_print_json(inv,
+                               json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:o}", "event", what, "kind",
+                                         weft_usb_kind_name(d->kind), "identity", d->identity, "name",
+                                         d->name, "node", d->node, "socket", d->place, "problem",
+                                         problem_to_json(appeared ? d->problem : "")),
+                               err);
+    fprintf(inv->out, "%s  %-18s %s  %s at %s (%s)%s%s\n", what, weft_usb_kind_name(d->kind), d->identity,
+            d->name, d->place, d->node, appeared && d->problem[0] ? ": " : "", appeared ? d->problem : "");
+    fflush(inv->out);
+    return WEFT_OK;
+}
+
+static weft_err watch_devices(const weft_invocation *inv, weft_error *err)
+{
+    enum { SLICE_MS = 200 };
+    weft_usb_watch *watch = NULL;
+    weft_err status = WEFT_OK;
+    WEFT_TRY(weft_usb_watch_open(&watch, err));
+    while (status == WEFT_OK && !weft_cancelled()) {
+        weft_usb_device d;
+        bool happened, appeared;
+        status = weft_usb_watch_next(watch, SLICE_MS, &happened, &appeared, &d, err);
+        if (status == WEFT_OK && happened)
+            status = tell_event(inv, appeared, &d, err);
+    }
+    weft_usb_watch_close(watch);
+    return status;
+}
+
 static weft_err run_devices(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const devices_args *const a = args;
+    if (a->watch)
+        return watch_devices(inv, err);
     found_devices *const found = weft_alloc(1, sizeof *found, err);
     if (!found)
         return WEFT_ERR_NOMEM;
@@ -157,7 +230,8 @@ const weft_command weft_cmd_devices = {
     .details =
         "Without options it looks for everything: GigE Vision cameras on every network interface, USB3\n"
         "Vision cameras, and serial ports that may be a light controller (opening one resets an Arduino).\n"
-        "With --rig, --port or --camera it tries what they name and nothing else.",
+        "With --rig, --port or --camera it tries what they name and nothing else.\n"
+        "--watch tells of USB devices that come and go: a device keeps its identity in every socket.",
     .example = "weft devices --json",
     .run = run_devices,
 };

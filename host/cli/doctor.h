@@ -76,6 +76,7 @@ void weft_doctor_serial_line(weft_doctor *doctor, weft_doctor_result *result);
 /* -- camera (doctor_camera.c) */
 
 void weft_doctor_camera_helpers(weft_doctor *doctor, weft_doctor_result *result);
+void weft_doctor_usb_cameras(weft_doctor *doctor, weft_doctor_result *result);
 void weft_doctor_camera(weft_doctor *doctor, weft_doctor_result *result);
 void weft_doctor_receive_buffer(weft_doctor *doctor, weft_doctor_result *result);
 void weft_doctor_lamps(weft_doctor *doctor, weft_doctor_result *result);

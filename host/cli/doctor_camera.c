@@ -2,6 +2,7 @@
 #include "host/capture/shoot.h"
 #include "host/cli/device_open.h"
 #include "host/cli/doctor.h"
+#include "host/usb/usb_devices.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,6 +22,36 @@ void weft_doctor_camera_helpers(weft_doctor *doctor, weft_doctor_result *result)
     else
         weft_doctor_say(result, WEFT_DOCTOR_FAILED, "build with libaravis-dev installed (./dev deps)",
                         "no helper weft-camera-NAME beside the program");
+}
+
+/* Plugged in, and may be opened: the libraries do not list a camera that may not. */
+void weft_doctor_usb_cameras(weft_doctor *doctor, weft_doctor_result *result)
+{
+    weft_usb_device devices[WEFT_USB_MAX];
+    weft_error why = {0};
+    int n = 0, n_cameras = 0;
+    if (doctor->is_rig) {
+        weft_doctor_say(result, WEFT_DOCTOR_SKIPPED, NULL, "the virtual scanner has none");
+        return;
+    }
+    if (weft_usb_list(devices, WEFT_USB_MAX, &n, &why) != WEFT_OK) {
+        weft_doctor_say(result, WEFT_DOCTOR_WARNING, NULL, "%s", why.text);
+        return;
+    }
+    for (int i = 0; i < n; i++) {
+        if (devices[i].kind == WEFT_USB_CONTROLLER)
+            continue;
+        n_cameras++;
+        if (devices[i].problem[0]) {
+            weft_doctor_say(result, WEFT_DOCTOR_FAILED, devices[i].problem, "%s %s (%s) cannot be opened",
+                            weft_usb_kind_name(devices[i].kind), devices[i].name, devices[i].identity);
+            return;
+        }
+    }
+    if (n_cameras == 0)
+        weft_doctor_say(result, WEFT_DOCTOR_SKIPPED, NULL, "none plugged in");
+    else
+        weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%d, free to be opened", n_cameras);
 }
 
 /* -- camera --------------------------------------------------------------------------------------------- */

@@ -19,6 +19,7 @@ const weft_doctor_check weft_doctor_checks[] = {
     {"last start", weft_doctor_last_start},
     {"serial line", weft_doctor_serial_line},
     {"camera backends", weft_doctor_camera_helpers},
+    {"USB cameras", weft_doctor_usb_cameras},
     {"camera", weft_doctor_camera},
     {"receive buffer", weft_doctor_receive_buffer},
     {"lamps", weft_doctor_lamps},
