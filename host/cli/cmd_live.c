@@ -18,6 +18,8 @@
 #define LIGHT_MS   1000 /* asked for again long before */
 #define RENEW_S    0.2
 #define DEADLINE_S 6.0
+/* Between two pictures of a still camera. */
+#define STILL_S 3.0
 
 typedef struct live_args {
     weft_device_options devices;
@@ -165,9 +167,20 @@ static weft_err wait_for_turn(live_run *run, double until_s, weft_error *err)
     return WEFT_OK;
 }
 
+/* A still camera's shutter is made for a hundred thousand releases: they are not spent on looking. */
+static double seconds_between(const live_run *run)
+{
+    const bool still = weft_camera_get_state(run->camera)->suffix[0] != '\0';
+    const double wanted_s = 1 / run->args->rate_hz;
+    if (still && wanted_s < STILL_S)
+        weft_warn("each picture releases the still camera's shutter: one every %g s", STILL_S);
+    return still ? fmax(wanted_s, STILL_S) : wanted_s;
+}
+
 static weft_err look(live_run *run, weft_error *err)
 {
     weft_captured_frame frame = {0};
+    const double period_s = seconds_between(run);
     const double begin_s = weft_clock_s();
     weft_err status = WEFT_OK;
     weft_camera_set_idle(run->camera, keep_lit, run);
@@ -179,10 +192,10 @@ static weft_err look(live_run *run, weft_error *err)
         if (status == WEFT_OK)
             status = show(run, &frame, err);
         if (status == WEFT_OK)
-            status = wait_for_turn(run, turn_s + 1 / run->args->rate_hz, err);
+            status = wait_for_turn(run, turn_s + period_s, err);
     }
     weft_camera_set_idle(run->camera, NULL, NULL);
-    weft_mosaic_fini(&frame.mosaic);
+    weft_captured_frame_fini(&frame);
     return status == WEFT_ERR_CANCELLED && run->args->seconds <= 0 ? WEFT_OK : status;
 }
 

@@ -66,8 +66,11 @@ void weft_doctor_camera(weft_doctor *doctor, weft_doctor_result *result)
     }
     const weft_camera_state *const s = weft_camera_get_state(camera);
     snprintf(doctor->camera, sizeof doctor->camera, "%s", s->id);
-    weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%s: %s %s, %d x %d, %d bits", s->id, s->vendor, s->model,
-                    s->width, s->height, s->bits);
+    if (s->width > 0)
+        weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%s: %s %s, %d x %d, %d bits", s->id, s->vendor,
+                        s->model, s->width, s->height, s->bits);
+    else /* a still camera: only a picture would tell */
+        weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%s: %s %s", s->id, s->vendor, s->model);
     weft_camera_close(camera);
 }
 
