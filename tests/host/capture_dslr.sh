@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Ten lights through libgphoto2 and the virtual D5100: capture, stop, resume, solve, against the truth and against
-# the same scan by the GigE Vision camera.
+# Ten lights through libgphoto2 and the virtual D5100: capture and solve, against the truth and against the same scan
+# by the GigE Vision camera.  Cut off in mid download and resumed.  Then WEFT_SOAK_COUNT sets (default 1) while the
+# body misbehaves at random (WEFT_SOAK_SEED) and its helper process is killed: every set gets complete, and its
+# normals are those of the undisturbed scan, so no frame has another light.
 # shellcheck source=tests/support/script.sh
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 [ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
@@ -68,10 +70,48 @@ expect 0 ok tell "dslr plug"
 expect 0 "11 frames" "$weft" capture cut.set --rig r --camera gphoto --resume
 expect_dark "resumed"
 
-# An empty battery.
-expect 0 ok tell "dslr turn 0x5001 4"
-expect 1 "battery is at 4 %" "$weft" capture flat.set --rig r --camera gphoto --exposure 0.04
-expect 0 ok tell "dslr turn 0x5001 90"
-expect 0 "3 frames" "$weft" capture flat.set --rig r --camera gphoto --exposure 0.04 --lights 0,1
+# Misbehaving at random.
+RANDOM=${WEFT_SOAK_SEED:-7}
+calm=$(jq -r .normal_deg.mean dslr.json)
+deeds=("fault stale 1" "fault twice 1" "fault line 1" "fault short 1" "fault burst 1" "fault busy 1" "fault stuck 1"
+    "fault no-shutter 1" "fault unplug 50" "fault jpeg 1" "turn 0x5004 2" "turn 0x5004 5" "turn 0xd100 65566" kill)
+n_deeds=0
+: >deeds
+disturb() { # PID of weft
+    local deed=${deeds[RANDOM % ${#deeds[@]}]}
+    n_deeds=$((n_deeds + 1))
+    echo "$deed" >>deeds
+    if [ "$deed" = kill ]; then
+        pgrep -P "$1" | xargs -r kill -9
+    else
+        tell "dslr $deed" >/dev/null
+    fi
+}
+n_resumes=0
+for n in $(seq "${WEFT_SOAK_COUNT:-1}"); do
+    options=(--exposure 0.04)
+    for _ in $(seq 12); do
+        "$weft" capture "$n.set" --rig r --camera gphoto -q "${options[@]}" >out 2>err &
+        pid=$!
+        while kill -0 $pid 2>/dev/null; do
+            sleep "0.$((RANDOM % 9))"
+            [ $((RANDOM % 3)) != 0 ] || disturb $pid
+        done
+        wait $pid && break
+        n_resumes=$((n_resumes + 1))
+        [ "$(wc -l <err)" -le 2 ] || fail "more than a line of words: $(cat err)"
+        [ -e "$n.set/set.json" ] && options=(--resume)
+        tell "dslr reset" >/dev/null
+    done
+    tell "dslr reset" >/dev/null
+    [ "$(jq -r .state "$n.set/set.json")" = complete ] || fail "set $n is not complete: $(cat err)"
+    "$weft" solve "$n.set" -c truth/truth.cal -o soak.maps --geometry sensor --force -q >out 2>&1 || fail "$(cat out)"
+    found=$("$weft" compare truth/sensor.maps soak.maps --json 2>/dev/null | jq -r .normal_deg.mean)
+    jq -en "($found - $calm) | fabs < 0.01" >/dev/null ||
+        fail "set $n: normals are $found degrees off, undisturbed $calm; $(cat deeds)"
+    rm -rf "$n.set"
+done
+echo "${WEFT_SOAK_COUNT:-1} sets complete, normals as undisturbed ($calm degrees); $n_deeds deeds, $n_resumes resumes"
+sort deeds | uniq -c
 expect 0 ok tell quit
 wait "$rig"
