@@ -67,6 +67,14 @@ static size_t character_length(const char *text)
     return n > 0 && weft_text_is_utf8(text, n) ? n : 0;
 }
 
+void weft_text_add_le(weft_text_buffer *buffer, uint64_t value, int bytes)
+{
+    for (int k = 0; k < bytes; k++) {
+        const char byte = (char)(value >> (8 * k) & 0xff);
+        weft_text_add_bytes(buffer, &byte, 1);
+    }
+}
+
 void weft_text_add_escaped(weft_text_buffer *buffer, const char *text)
 {
     while (text && *text) {

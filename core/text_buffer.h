@@ -10,6 +10,7 @@
 #include "core/error.h"
 
 #include <stddef.h>
+#include <stdint.h>
 
 typedef struct weft_text_buffer {
     char *text; /* ends with NUL; NULL as long as it is empty */
@@ -26,6 +27,9 @@ void weft_text_add(weft_text_buffer *buffer, const char *format, ...) WEFT_PRINT
 
 /** Appends `n` bytes as they are. */
 void weft_text_add_bytes(weft_text_buffer *buffer, const char *bytes, size_t n);
+
+/** Appends the low `bytes` bytes of a number, the lowest first: little endian, as binary files have it. */
+void weft_text_add_le(weft_text_buffer *buffer, uint64_t value, int bytes);
 
 /** Appends text for XML and HTML: < > & " ' become entities, control characters blanks; what is not UTF-8
  * becomes U+FFFD byte by byte.  NULL adds nothing. */

@@ -5,10 +5,26 @@
 #include <stdio.h>
 #include <string.h>
 
+extern const weft_exporter weft_exporter_gltf;
+extern const weft_exporter weft_exporter_mtlx;
 extern const weft_exporter weft_exporter_png;
+extern const weft_exporter weft_exporter_u3m;
+extern const weft_exporter weft_exporter_ktx2, weft_exporter_unreal, weft_exporter_unity_hdrp,
+    weft_exporter_unity_urp;
+extern const weft_exporter weft_exporter_godot, weft_exporter_blender;
 
+/* One a line, so that a new one is one line. */
 const weft_exporter *const weft_exporters[] = {
-    &weft_exporter_png,
+    &weft_exporter_png,        //
+    &weft_exporter_gltf,       //
+    &weft_exporter_u3m,        //
+    &weft_exporter_mtlx,       //
+    &weft_exporter_ktx2,       //
+    &weft_exporter_unreal,     //
+    &weft_exporter_unity_hdrp, //
+    &weft_exporter_unity_urp,  //
+    &weft_exporter_godot,      //
+    &weft_exporter_blender,    //
     NULL,
 };
 
