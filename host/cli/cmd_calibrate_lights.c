@@ -2,6 +2,7 @@
 #include "host/cli/command.h"
 
 #include "calibration/calibration_report.h"
+#include "calibration/lights/ball_lights.h"
 #include "calibration/lights/light_fit.h"
 #include "calibration/lights/white_sheet_file.h"
 #include "core/csv.h"
@@ -11,11 +12,14 @@
 #include "core/progress.h"
 #include "host/set/plate.h"
 
+#include <math.h>
 #include <string.h>
 
+#define BALL_SIGMA_MM 3 /* what the glints' shape does to their middles */
+
 typedef struct lights_args {
-    const char *output, *guess, *positions;
-    double reflectance, sigma_mm, height_mm;
+    const char *output, *guess, *positions, *balls;
+    double ball_radius_mm, reflectance, sigma_mm, height_mm;
     weft_size grid;
 } lights_args;
 
@@ -46,6 +50,20 @@ static const weft_field fields[] = {
      .max = 1000,
      .def = "3",
      .help = "how far each coordinate of --positions may be off (standard deviation)"},
+    {.key = "balls",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(lights_args, balls),
+     .unit = "SET",
+     .help =
+         "glossy dark balls on the table under every light: their glints give positions that the fit weighs"},
+    {.key = "ball-radius",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(lights_args, ball_radius_mm),
+     .unit = "mm",
+     .min = 0.5,
+     .max = 500,
+     .def = "12",
+     .help = "of the balls"},
     {.key = "sheet-height",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(lights_args, height_mm),
@@ -121,14 +139,65 @@ static weft_err make_options(const lights_args *args, weft_light_fit_options *op
         return weft_fail(err, WEFT_ERR_USAGE, "--grid %dx%d: wanted 4 to 512 nodes each way",
                          args->grid.width, args->grid.height);
     options->sheet_height_mm = args->height_mm;
-    if (args->guess && args->positions)
-        return weft_fail(err, WEFT_ERR_USAGE, "--guess and --positions: give one of them");
+    if (!!args->guess + !!args->positions + !!args->balls > 1)
+        return weft_fail(err, WEFT_ERR_USAGE, "--guess, --positions and --balls: give one of them");
     const char *const file = args->positions ? args->positions : args->guess;
     if (!file)
         return WEFT_OK;
     options->guess_sigma_mm = args->positions ? args->sigma_mm : 0;
     return weft_folder_exists(file) ? guess_from_calibration(file, options, err)
                                     : guess_from_csv(file, options, err);
+}
+
+static weft_err load_balls(const weft_set *set, weft_ball_pictures *pictures, weft_error *err)
+{
+    weft_plate ambient = {0};
+    bool has_ambient = false;
+    WEFT_TRY(weft_ball_pictures_init(pictures, set->width, set->height, weft_set_n_lights(set), err));
+    weft_err status = weft_plate_load_ambient(set, &ambient, &has_ambient, err);
+    for (int light = 0; light < pictures->n_lights && status == WEFT_OK; light++) {
+        weft_plate plate;
+        status = weft_plate_load_light(set, light, has_ambient ? &ambient : NULL, &plate, err);
+        if (status != WEFT_OK)
+            break;
+        status = weft_ball_pictures_add(pictures, light, &plate.image, err);
+        weft_plate_fini(&plate);
+    }
+    weft_plate_fini(&ambient);
+    return status;
+}
+
+/* Positions by the glints in balls, for the fit to weigh. */
+static weft_err guess_from_balls(const lights_args *args, const weft_calibration *cal,
+                                 weft_light_fit_options *options, weft_error *err)
+{
+    weft_ball_pictures pictures = {0};
+    weft_ball_lights found;
+    weft_set set;
+    WEFT_TRY(weft_set_load(args->balls, &set, err));
+    weft_err status = weft_set_require_lights(&set, err);
+    if (status == WEFT_OK)
+        status = weft_calibration_require_size(cal, set.width, set.height, args->output, err);
+    if (status == WEFT_OK)
+        status = load_balls(&set, &pictures, err);
+    if (status == WEFT_OK) {
+        status = weft_ball_lights_find(&cal->camera, &pictures, args->ball_radius_mm, &found, err);
+        if (status != WEFT_OK)
+            weft_prefix(err, status, "%s", set.folder);
+    }
+    if (status == WEFT_OK) {
+        options->n_guess = pictures.n_lights;
+        options->guess_sigma_mm = fmax(BALL_SIGMA_MM, 2 * found.miss_mean_mm);
+        memcpy(options->guess, found.position, sizeof found.position);
+        weft_note("%d balls: the lights' mirrored rays miss each other by %.2f mm; taken as known to %.1f mm",
+                  found.n_balls, found.miss_mean_mm, options->guess_sigma_mm);
+        for (int l = 0; l < pictures.n_lights; l++)
+            weft_explain("light %d by the balls: %.1f %.1f %.1f mm", l, found.position[l].x,
+                         found.position[l].y, found.position[l].z);
+    }
+    weft_ball_pictures_fini(&pictures);
+    weft_set_fini(&set);
+    return status;
 }
 
 static weft_err add_light(const weft_set *set, int light, const weft_plate *ambient, weft_white_sheet *sheet,
@@ -180,7 +249,16 @@ static json_t *sheet_json(const weft_light_sheet *s)
                      "tilt_sigma_rad", weft_json_numbers(s->tilt_sigma_rad, 2), "bow_used", (int)s->bow_used);
 }
 
-static json_t *report_json(const weft_set *set, const lights_args *args, const weft_calibration *cal,
+static json_t *positions_json(const weft_light_fit_options *options)
+{
+    json_t *const positions = json_array();
+    for (int l = 0; l < options->n_guess; l++)
+        json_array_append_new(positions, weft_json_numbers(&options->guess[l].x, 3));
+    return positions;
+}
+
+static json_t *report_json(const weft_set *set, const lights_args *args,
+                           const weft_light_fit_options *options, const weft_calibration *cal,
                            const weft_light_fit_report *r)
 {
     json_t *const rounds = json_array(), *const lights = json_array();
@@ -201,6 +279,11 @@ static json_t *report_json(const weft_set *set, const lights_args *args, const w
         json_object_set_new(report, "model_error", json_real(r->model_error));
         json_object_set_new(report, "sheet", sheet_json(&r->sheet));
         json_object_set_new(report, "sheet_height_mm", json_real(args->height_mm));
+    }
+    if (report && args->balls) {
+        json_object_set_new(report, "balls", json_string(args->balls));
+        json_object_set_new(report, "positions_sigma_mm", json_real(options->guess_sigma_mm));
+        json_object_set_new(report, "positions_by_balls", positions_json(options));
     }
     if (report && args->guess)
         json_object_set_new(report, "guess", json_string(args->guess));
@@ -273,6 +356,8 @@ static weft_err fit(const weft_invocation *inv, const lights_args *args, const w
     weft_light_fit_report report;
     weft_white_sheet sheet;
     WEFT_TRY(make_options(args, &options, err));
+    if (args->balls)
+        WEFT_TRY(guess_from_balls(args, cal, &options, err));
     WEFT_TRY(load_sheet(set, &sheet, err));
     const weft_calibration former = *cal; /* its numbers; what it points to is not used */
     weft_err status = weft_light_fit(&cal->camera, &sheet, &options, cal, &report, err);
@@ -292,7 +377,7 @@ static weft_err fit(const weft_invocation *inv, const lights_args *args, const w
     if (!report.settled)
         weft_warn("the lights still moved by %.2f mm in the last round; the sheet may be uneven",
                   report.rounds[report.n_rounds - 1].moved_mm);
-    WEFT_TRY(weft_calibration_set_report(cal, "lights", report_json(set, args, cal, &report), err));
+    WEFT_TRY(weft_calibration_set_report(cal, "lights", report_json(set, args, &options, cal, &report), err));
     WEFT_TRY(weft_calibration_save(args->output, cal, err));
     return print_result(inv, args, cal, &report, err);
 }
