@@ -1,5 +1,6 @@
 #include "host/cli/command.h"
 
+extern const weft_command weft_cmd_batch;
 extern const weft_command weft_cmd_brdf;
 extern const weft_command weft_cmd_calibrate_colour;
 extern const weft_command weft_cmd_calibrate_report;
@@ -56,6 +57,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_check,
+    &weft_cmd_batch,
     &weft_cmd_compare,
     &weft_cmd_bake,
     &weft_cmd_preview,

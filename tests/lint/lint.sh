@@ -42,6 +42,7 @@ layers() {
     wrong host/photo 'host/(cli|daemon|library|capture|camera|light|rig)'
     wrong host/capture 'host/(cli|solve|rig)'
     wrong host/library 'host/(cli|daemon|capture|solve|camera|light|rig)'
+    wrong host/batch 'host/(cli|capture|solve|camera|light|rig|library)'
     wrong host/daemon 'host/(capture|solve|camera|light|rig)'
     return $bad
 }
