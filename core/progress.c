@@ -1,7 +1,7 @@
 #include "core/progress.h"
 
 #include "core/log.h"
-#include "core/report.h"
+#include "core/report_channel.h"
 
 #include <signal.h>
 #include <stdio.h>

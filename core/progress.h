@@ -2,7 +2,7 @@
  * Progress of long work, and its cancellation.
  *
  * On a terminal a bar with rate and time left; piped, a line at most every few seconds; silent with -q.
- * When a program listens (core/report.h) it gets the progress instead of the terminal.
+ * When a program listens (core/report_channel.h) it gets the progress instead of the terminal.
  * A worker calls weft_progress_step() per unit and returns WEFT_ERR_CANCELLED when that says so.
  */
 #ifndef WEFT_CORE_PROGRESS_H

@@ -4,7 +4,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
-#include "core/report.h"
+#include "core/report_channel.h"
 
 #include <math.h>
 

@@ -3,7 +3,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
-#include "core/report.h"
+#include "core/report_channel.h"
 #include "core/version.h"
 #include "host/cli/remote.h"
 

@@ -2,7 +2,7 @@
 
 #include "core/log.h"
 #include "core/mem.h"
-#include "core/report.h"
+#include "core/report_channel.h"
 #include "core/text.h"
 
 #include <errno.h>

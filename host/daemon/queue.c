@@ -7,6 +7,7 @@
 #include "core/progress.h"
 #include "host/daemon/child.h"
 #include "host/daemon/job_kinds.h"
+#include "host/daemon/job_request.h"
 #include "host/daemon/job_words.h"
 #include "host/library/catalogue.h"
 
@@ -116,6 +117,15 @@ static held_job *find_held(weft_queue *queue, int64_t id)
         if (queue->held[i].id == id)
             return &queue->held[i];
     return NULL;
+}
+
+/* The job begins when somebody holds it; false when too many are held. */
+static bool expect_holder(weft_queue *queue, int64_t id)
+{
+    held_job *const held = find_held(queue, 0);
+    if (held)
+        *held = (held_job){.id = id, .since_s = weft_clock_s()};
+    return held != NULL;
 }
 
 int weft_queue_running(const weft_queue *queue)
@@ -460,14 +470,18 @@ void weft_queue_tick(weft_queue *queue)
 
 /* ---- what clients ask ---- */
 
+static weft_err too_many_held(weft_error *err)
+{
+    return weft_fail(err, WEFT_ERR_RANGE, "more than %d jobs are held", MAX_HOLDS);
+}
+
 weft_err weft_queue_add(weft_queue *queue, weft_job *job, bool hold, weft_error *err)
 {
-    held_job *const held = hold ? find_held(queue, 0) : NULL;
-    if (hold && !held)
-        return weft_fail(err, WEFT_ERR_RANGE, "more than %d jobs are held", MAX_HOLDS);
+    if (hold && !find_held(queue, 0))
+        return too_many_held(err);
     WEFT_TRY(weft_job_store_add(queue->db, job, err));
-    if (held)
-        *held = (held_job){.id = job->id, .since_s = weft_clock_s()};
+    if (hold)
+        expect_holder(queue, job->id);
     (void)weft_job_store_trim(queue->db, KEEP_JOBS, NULL);
     tell_state(queue, job->id);
     queue->look = true;
@@ -508,12 +522,17 @@ weft_err weft_queue_resume(weft_queue *queue, int64_t id, weft_error *err)
     weft_job job;
     WEFT_TRY(weft_job_store_get(queue->db, id, &job, err));
     const weft_job_state state = job.state;
+    const bool hold = weft_job_request_holds(job.request);
     weft_job_fini(&job);
     if (state != WEFT_JOB_FAILED && state != WEFT_JOB_CANCELLED)
         return weft_fail(err, WEFT_ERR_EXISTS,
                          "job %" PRId64 " is %s: only a failed or cancelled one is resumed", id,
                          weft_job_state_name(state));
+    if (hold && !find_held(queue, 0))
+        return too_many_held(err);
     WEFT_TRY(weft_job_store_requeue(queue->db, id, err));
+    if (hold)
+        expect_holder(queue, id);
     tell_state(queue, id);
     queue->look = true;
     return WEFT_OK;
@@ -574,11 +593,22 @@ static weft_err look_at_left_over(void *context, weft_job *job, weft_error *err)
     return WEFT_OK;
 }
 
+/* Who waited to hold a job comes back, or the job is cancelled. */
+static weft_err look_at_queued(void *context, weft_job *job, weft_error *err)
+{
+    (void)err;
+    if (weft_job_request_holds(job->request))
+        expect_holder(context, job->id);
+    return WEFT_OK;
+}
+
 weft_err weft_queue_recover(weft_queue *queue, weft_error *err)
 {
+    static const weft_job_state queued = WEFT_JOB_QUEUED;
     static const weft_job_state running = WEFT_JOB_RUNNING;
     recovery r = {0};
     WEFT_TRY(weft_job_store_visit(queue->db, &running, 0, -1, look_at_left_over, &r, err));
+    WEFT_TRY(weft_job_store_visit(queue->db, &queued, 0, -1, look_at_queued, queue, err));
     for (int i = 0; i < r.n; i++) {
         if (r.jobs[i].problem)
             WEFT_TRY(weft_job_store_finished(queue->db, r.jobs[i].id, WEFT_JOB_FAILED, -1, r.jobs[i].problem,

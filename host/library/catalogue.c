@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 
 enum { MAX_DEPTH = 16, MAX_WORDS = 16 };
+/* Others (the daemon) wait while this one writes: so long, and then it is their turn. */
+#define TRANSACTION_S 0.05
 
 const char *weft_catalogue_kind(int i)
 {
@@ -63,7 +65,7 @@ weft_err weft_catalogue_index(weft_library_db *db, const char *path, bool *known
     if (status == WEFT_ERR_MISSING)
         return weft_library_db_run(db, err, "DELETE FROM items WHERE path = ?", "s", relative);
     WEFT_TRY(status);
-    status = store(db, relative, &item, 0, err);
+    status = store(db, relative, &item, -1, err);
     weft_catalogue_item_fini(&item);
     *known = status == WEFT_OK;
     return status;
@@ -75,9 +77,29 @@ typedef struct walk {
     weft_library_db *db;
     bool all;
     int64_t round; /* marks what is still there */
+    bool writing;  /* in a transaction, since: */
+    double since_s;
     weft_progress *progress;
     weft_catalogue_report *report;
 } walk;
+
+static weft_err begin_writing(walk *w, weft_error *err)
+{
+    if (w->writing)
+        return WEFT_OK;
+    WEFT_TRY(weft_library_db_exec(w->db, "BEGIN IMMEDIATE", err));
+    w->writing = true;
+    w->since_s = weft_clock_s();
+    return WEFT_OK;
+}
+
+static weft_err end_writing(walk *w, weft_error *err)
+{
+    if (!w->writing)
+        return WEFT_OK;
+    w->writing = false;
+    return weft_library_db_exec(w->db, "COMMIT", err);
+}
 
 /* Whether the catalogue has it as it is now; then it is only marked. */
 static weft_err is_unchanged(walk *w, const char *relative, const char *kind, const char *stamp, bool *same,
@@ -92,6 +114,7 @@ static weft_err is_unchanged(walk *w, const char *relative, const char *kind, co
         return WEFT_OK;
     w->report->n_problems += sqlite3_column_type(rows, 0) != SQLITE_NULL;
     sqlite3_finalize(rows);
+    WEFT_TRY(begin_writing(w, err));
     return weft_library_db_run(w->db, err, "UPDATE items SET seen = ? WHERE path = ?", "is", w->round,
                                relative);
 }
@@ -111,12 +134,16 @@ static weft_err enter(walk *w, const char *absolute, const char *relative, const
         if (read == WEFT_ERR_MISSING)
             return WEFT_OK;
         WEFT_TRY(read);
-        const weft_err status = store(w->db, relative, &item, w->round, err);
+        weft_err status = begin_writing(w, err);
+        if (status == WEFT_OK)
+            status = store(w->db, relative, &item, w->round, err);
         w->report->n_read++;
         w->report->n_problems += item.problem[0] != '\0';
         weft_catalogue_item_fini(&item);
         WEFT_TRY(status);
     }
+    if (w->writing && weft_clock_s() - w->since_s > TRANSACTION_S)
+        WEFT_TRY(end_writing(w, err));
     return weft_progress_step(w->progress, 1, err);
 }
 
@@ -165,17 +192,20 @@ weft_err weft_catalogue_reindex(weft_library_db *db, bool all, weft_progress *pr
     *report = (weft_catalogue_report){0};
     weft_progress_begin(progress, "indexing", "items", 0);
     WEFT_TRY(weft_library_db_number(db, &w.round, err, "SELECT coalesce(max(seen), 0) + 1 FROM items"));
-    WEFT_TRY(
-        weft_library_db_exec(db, "BEGIN IMMEDIATE", err)); /* one sync for all, and nobody sees half of it */
+    /* What another program enters from here on was not there to be seen, and stays. */
+    WEFT_TRY(weft_library_db_exec(db, "UPDATE items SET seen = 0 WHERE seen = -1", err));
     weft_err status = walk_folder(&w, db->root, 0, err);
+    if (status == WEFT_OK)
+        status = begin_writing(&w, err);
     if (status == WEFT_OK)
         status = weft_library_db_number(db, &before, err, "SELECT count(*) FROM items");
     if (status == WEFT_OK)
-        status = weft_library_db_run(db, err, "DELETE FROM items WHERE seen <> ?", "i", w.round);
+        status =
+            weft_library_db_run(db, err, "DELETE FROM items WHERE seen <> ? AND seen <> -1", "i", w.round);
     if (status == WEFT_OK)
         status = weft_library_db_number(db, &after, err, "SELECT count(*) FROM items");
-    if (status == WEFT_OK)
-        status = weft_library_db_exec(db, "COMMIT", err);
+    const weft_err ended = end_writing(&w, status == WEFT_OK ? err : NULL); /* what was read stays read */
+    status = status == WEFT_OK ? ended : status;
     if (status != WEFT_OK)
         sqlite3_exec(db->sql, "ROLLBACK", NULL, NULL, NULL);
     report->n_removed = (int)(before - after);

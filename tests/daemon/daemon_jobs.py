@@ -117,6 +117,21 @@ def test_sigkill_keeps_what_ran():
             assert not [f for f in os.listdir(d.library) if f.startswith(".weft-")], os.listdir(d.library)
 
 
+def test_held_jobs_wait_for_their_holder():
+    """Also behind a restart: a light that somebody meant to hold does not come on by itself."""
+    with scratch() as folder, Weftd(folder, "--port", "/dev/null") as d:
+        body = {"command": "light off", "hold": True}
+        first, second = (d.post("/v1/jobs", body).json["id"] for _ in range(2))
+        d.kill()
+        d.start()
+        time.sleep(1)
+        assert d.job(first)["state"] == d.job(second)["state"] == "queued"
+        watcher = Watcher(d, f"?job={first}&hold=1")
+        seen = watcher.until(lambda _, kind, data: kind == "job.state" and data["state"] == "failed")
+        assert "/dev/null" in seen[-1][2]["error"], seen[-1]
+        assert d.wait(second, timeout=15)["state"] == "cancelled" and d.job(second)["attempt"] == 0
+
+
 def test_one_daemon_per_library_and_socket():
     with scratch() as folder, Weftd(folder) as d:
         for options, words in ((["--library", d.library, "--socket", d.socket + "2"], "another weftd serves"),

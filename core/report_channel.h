@@ -8,8 +8,8 @@
  *     {"progress":{"what":"capturing","unit":"frames","done":3,"total":11}}
  *     {"picture":{"name":"light-03.dng","width":616,"height":408,...}}       + memfd: a JPEG
  */
-#ifndef WEFT_CORE_REPORT_H
-#define WEFT_CORE_REPORT_H
+#ifndef WEFT_CORE_REPORT_CHANNEL_H
+#define WEFT_CORE_REPORT_CHANNEL_H
 
 #include <jansson.h>
 #include <stdbool.h>

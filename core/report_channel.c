@@ -1,4 +1,4 @@
-#include "core/report.h"
+#include "core/report_channel.h"
 
 #include "core/text.h"
 
