@@ -165,6 +165,8 @@ static weft_err run_here_or_there(const weft_command *command, int argc, char **
 {
     char socket[108];
     bool there;
+    if (command->stays_here && command->stays_here(args))
+        return command->run(inv, args, err);
     WEFT_TRY(weft_remote_wanted(command, socket, &there, err));
     return there ? weft_remote_run(command, argc, argv, inv, socket, exit_status, err)
                  : command->run(inv, args, err);

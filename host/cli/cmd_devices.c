@@ -221,6 +221,12 @@ static weft_err run_devices(const weft_invocation *inv, const void *args, weft_e
     return status;
 }
 
+/* Nothing is opened, and it never ends: nothing for the one who owns the scanner. */
+static bool is_watch(const void *args)
+{
+    return ((const devices_args *)args)->watch;
+}
+
 const weft_command weft_cmd_devices = {
     .name = "devices",
     .summary = "cameras and light controllers found, and why one cannot be used",
@@ -234,4 +240,5 @@ const weft_command weft_cmd_devices = {
         "--watch tells of USB devices that come and go: a device keeps its identity in every socket.",
     .example = "weft devices --json",
     .run = run_devices,
+    .stays_here = is_watch,
 };

@@ -33,6 +33,7 @@ typedef struct weft_command {
     const char *details;      /* more for --help: units, files, what it needs first; NULL */
     const char *example;      /* "weft capture twill.set --exposure 0.04" */
     weft_err (*run)(const weft_invocation *inv, const void *args, weft_error *err);
+    bool (*stays_here)(const void *args); /* true: not for a daemon, although the command is; NULL: never */
 } weft_command;
 
 /** The options that every command has; ends with {0}. */

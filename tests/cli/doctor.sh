@@ -30,7 +30,7 @@ for _ in $(seq 300); do
 done
 
 # Old firmware is the one failure; its remedy mends it.
-expect 1 '1 of 18 checks failed' "$weft" doctor --rig r
+expect 1 '1 of 19 checks failed' "$weft" doctor --rig r
 line FAILED firmware 'is older than'
 line FAILED firmware 'remedy: weft flash'
 line warning settings 'weft light set serial'
@@ -45,7 +45,7 @@ line ok 'serial line' '200 questions: 0 damaged'
 line ok lamps '10 lamps'
 line ok camera 'aravis:127.0.0.1'
 expect 0 '"ok":true' "$weft" doctor --rig r --json
-[ "$(jq '.checks | length' out)" = 18 ] || { cat out; exit 1; }
+[ "$(jq '.checks | length' out)" = 19 ] || { cat out; exit 1; }
 
 # A lamp that never shines, and one that always does.
 tell board lamp 3 off
@@ -72,6 +72,6 @@ expect 1 '"verdict":"failed"' "$weft" doctor --rig r --json
 grep -q "sleep (process $other)" out || { cat out; exit 1; }
 kill $other
 wait $other 2>/dev/null
-expect 1 '1 of 18 checks failed' "$weft" doctor --rig r --port /dev/ttyNOT
+expect 1 '1 of 19 checks failed' "$weft" doctor --rig r --port /dev/ttyNOT
 line FAILED permission 'there is no such port'
 exit 0
