@@ -1,7 +1,7 @@
 /**
  * Where the lights are, from glossy or mirroring balls on the table: each lamp mirrors itself in each ball,
  * and the mirrored rays of a lamp meet where it is.  Weaker than the white sheet (a few millimetres), but it
- * needs no model of the lamps and no start: a check and a prior for the sheet's fit.
+ * needs no model of the lamps and no start: a check and a start for the sheet's fit.
  */
 #ifndef WEFT_CALIBRATION_LIGHTS_BALL_LIGHTS_H
 #define WEFT_CALIBRATION_LIGHTS_BALL_LIGHTS_H

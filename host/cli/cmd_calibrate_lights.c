@@ -15,8 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-#define BALL_SIGMA_MM 3 /* what the glints' shape does to their middles */
-
 typedef struct lights_args {
     const char *output, *guess, *positions, *balls;
     double ball_radius_mm, reflectance, sigma_mm, height_mm;
@@ -54,8 +52,7 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(lights_args, balls),
      .unit = "SET",
-     .help =
-         "glossy dark balls on the table under every light: their glints give positions that the fit weighs"},
+     .help = "glossy dark balls on the table under every light: their glints give the rough positions"},
     {.key = "ball-radius",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(lights_args, ball_radius_mm),
@@ -167,7 +164,9 @@ static weft_err load_balls(const weft_set *set, weft_ball_pictures *pictures, we
     return status;
 }
 
-/* Positions by the glints in balls, for the fit to weigh. */
+/* Positions by the glints in balls: where the fit begins, and where each light is expected.  Their errors, of
+ * the glints' shape and the balls' radius, are alike for all lights, so as a prior they would outweigh the
+ * sheet. */
 static weft_err guess_from_balls(const lights_args *args, const weft_calibration *cal,
                                  weft_light_fit_options *options, weft_error *err)
 {
@@ -187,10 +186,9 @@ static weft_err guess_from_balls(const lights_args *args, const weft_calibration
     }
     if (status == WEFT_OK) {
         options->n_guess = pictures.n_lights;
-        options->guess_sigma_mm = fmax(BALL_SIGMA_MM, 2 * found.miss_mean_mm);
         memcpy(options->guess, found.position, sizeof found.position);
-        weft_note("%d balls: the lights' mirrored rays miss each other by %.2f mm; taken as known to %.1f mm",
-                  found.n_balls, found.miss_mean_mm, options->guess_sigma_mm);
+        weft_note("%d balls: the lights' mirrored rays miss each other by %.2f mm", found.n_balls,
+                  found.miss_mean_mm);
         for (int l = 0; l < pictures.n_lights; l++)
             weft_explain("light %d by the balls: %.1f %.1f %.1f mm", l, found.position[l].x,
                          found.position[l].y, found.position[l].z);
@@ -282,7 +280,6 @@ static json_t *report_json(const weft_set *set, const lights_args *args,
     }
     if (report && args->balls) {
         json_object_set_new(report, "balls", json_string(args->balls));
-        json_object_set_new(report, "positions_sigma_mm", json_real(options->guess_sigma_mm));
         json_object_set_new(report, "positions_by_balls", positions_json(options));
     }
     if (report && args->guess)
