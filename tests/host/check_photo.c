@@ -227,6 +227,88 @@ static void test_uneven_light(void **state)
     json_decref(manifest);
 }
 
+/* A drawn photograph in memory, and what a fit to it says. */
+static void fit_scene(const chart_scene *scene, int stained, double part, weft_photo_chart *seen)
+{
+    weft_photo photo = {.cfa = WEFT_CFA_RGGB};
+    weft_photo_correction correction;
+    const weft_texts none = {0};
+    chart_scene_draw(scene, &photo.image, &photo.clipped);
+    if (stained >= 0) { /* `part` of the patch's width is half as bright */
+        double x, y, u, v;
+        weft_chart_patch_centre(macbeth(), stained, &x, &y);
+        assert_true(weft_homography_apply(&scene->to_pixel, x, y, &u, &v));
+        const int half = 12;
+        for (int j = -half; j <= half; j++)
+            for (int i = -half; i <= -half + (int)(2 * half * part); i++)
+                weft_image_row(&photo.image, 0, (int)v + j)[(int)u + i] *= 0.5F;
+    }
+    assert_ok(weft_photo_correction_fit(&photo, macbeth(), NULL, &none, WEFT_COLOUR_MATRIX, seen, &correction,
+                                        err));
+    weft_photo_fini(&photo);
+}
+
+/* A stain over a fifth or a half of a patch leaves it out by name; noise and a slope of the light do not. */
+static void test_stained_patches(void **state)
+{
+    (void)state;
+    weft_photo_chart seen;
+    chart_scene scene = scene_of(turned(0.6, 0, 0));
+    static const double parts[2] = {0.3, 0.5};
+    for (int k = 0; k < 2; k++) {
+        fit_scene(&scene, 8, parts[k], &seen);
+        for (int p = 0; p < 24; p++)
+            if (p == 8)
+                assert_ptr_equal(seen.colours[p].excluded, weft_patch_stained);
+            else
+                assert_null(seen.colours[p].excluded);
+        assert_int_equal(seen.fit.n_used, 23);
+    }
+    scene.fall_u = -0.35;
+    scene.fall_v = 0.2;
+    scene.shot = 1e-3; /* a full well of 1000 electrons */
+    scene.read = 3e-3;
+    fit_scene(&scene, -1, 0, &seen);
+    for (int p = 0; p < 24; p++)
+        assert_null(seen.colours[p].excluded);
+}
+
+/* Corners by hand where the chart does not stand out, and patches left out by hand. */
+static void test_corners_and_patches_by_hand(void **state)
+{
+    (void)state;
+    char said[4096], corners[200] = "";
+    const weft_mat3 view = turned(0.6, 30, 0);
+    const chart_scene scene = scene_of(view);
+    const char *const photo = path_of("hand.dng");
+    static const double sign[4][2] = {{-1, 1}, {1, 1}, {1, -1}, {-1, -1}};
+    double x, y, u, v;
+    weft_chart_half_size(macbeth(), &x, &y);
+    for (int k = 0; k < 4; k++) {
+        assert_true(weft_homography_apply(&view, sign[k][0] * x, sign[k][1] * y, &u, &v));
+        snprintf(corners + strlen(corners), sizeof corners - strlen(corners), "%s%.0f,%.0f", k ? "," : "", u,
+                 v);
+    }
+    draw_dng(&scene, photo, 0.01);
+    assert_int_equal(run(said,
+                         "weft calibrate colour --apply %s --chart-photo %s -o %s -q --corners %s --exclude "
+                         "cyan --overlay %s",
+                         photo, photo, path_of("hand"), corners, path_of("hand.png")),
+                     0);
+    assert_true(weft_file_exists(path_of("hand.png")));
+    json_t *manifest;
+    assert_ok(weft_json_load(path_of("hand/corrected.json"), &manifest, err));
+    const json_t *const colour = json_object_get(json_object_get(manifest, "correction"), "colour");
+    assert_int_equal(json_array_size(json_object_get(colour, "gamut")), 3 * 23);
+    json_decref(manifest);
+    assert_int_equal(run(said, "weft calibrate colour --apply %s --chart-photo %s -o %s --corners 1,2,3",
+                         photo, photo, path_of("hand2")),
+                     2);
+    assert_int_equal(run(said, "weft calibrate colour --apply %s --chart-photo %s -o %s --exclude puce",
+                         photo, photo, path_of("hand2")),
+                     2);
+}
+
 /* Half the exposure is made up for by the files' own shutter times. */
 static void test_exposures(void **state)
 {
@@ -436,10 +518,16 @@ static void test_profiles(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_way_round), cmocka_unit_test(test_encodings),
-        cmocka_unit_test(test_uneven_light),  cmocka_unit_test(test_exposures),
-        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_sheets_that_are_none),
-        cmocka_unit_test(test_a_batch),       cmocka_unit_test(test_profiles),
+        cmocka_unit_test(test_any_way_round),
+        cmocka_unit_test(test_encodings),
+        cmocka_unit_test(test_uneven_light),
+        cmocka_unit_test(test_exposures),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_stained_patches),
+        cmocka_unit_test(test_corners_and_patches_by_hand),
+        cmocka_unit_test(test_sheets_that_are_none),
+        cmocka_unit_test(test_a_batch),
+        cmocka_unit_test(test_profiles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
