@@ -187,7 +187,8 @@ def make_flat(folder, width=32, height=24, noise=False):
         for i, (x, y, z) in enumerate(lights):
             rows = (b"\0" + struct.pack(">H", round(65535 * 0.5 * z)) * width) * height
             if noise:
-                rows = b"".join(b"\0" + bytes(v | 32 for v in os.urandom(2 * width)) for _ in range(height))
+                high = bytes([round(65535 * 0.5 * z) >> 8])  # the low byte is noise
+                rows = b"".join(b"\0" + b"".join(high + bytes([v]) for v in os.urandom(width)) for _ in range(height))
             with open(f"{folder}/p{i}.png", "wb") as png:
                 png.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0))
                           + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
