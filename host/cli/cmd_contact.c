@@ -169,7 +169,7 @@ static weft_err place_preview(const block *b, int tile, weft_preview_shape shape
     view.repeat = b->args->repeat;
     if (detail)
         view.crop = *detail;
-    weft_preview_direction(angles[0], angles[1], view.light.direction);
+    weft_preview_direction(angles[0], angles[1], view.lights[0].direction);
     WEFT_TRY(weft_preview_render(&b->input->surface, &view, &picture, err));
     snprintf(label, sizeof label, "%s, light %g, %g",
              shape == WEFT_PREVIEW_SPHERE ? "ball"

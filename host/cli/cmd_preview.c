@@ -1,22 +1,26 @@
 #include "host/cli/command.h"
+#include "host/cli/preview_grid.h"
 #include "host/cli/preview_input.h"
+#include "host/cli/preview_lights.h"
 #include "host/cli/preview_match.h"
 
 #include "core/file.h"
 #include "core/formats/image_file.h"
+#include "core/mem.h"
 
 #include <math.h>
+#include <string.h>
 #include <time.h>
 
 #define LONGEST_SIDE 1600 /* of a plane without --size */
 
 typedef struct preview_args {
-    const char *output, *brdf, *match, *cal;
-    weft_texts params;
-    weft_numbers light, light_mm, crop;
-    int shape;
+    const char *output, *brdf, *match, *cal, *env, *columns;
+    weft_texts params, lamps;
+    weft_numbers light, light_mm, crop, sky;
+    int shape, area, sky_model, tone, sweep;
     weft_size size;
-    double exposure_ev, ambient, background, repeat, fov_deg;
+    double exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
 
 static const weft_field fields[] = {
@@ -50,12 +54,65 @@ static const weft_field fields[] = {
      .offset = offsetof(preview_args, light_mm),
      .unit = "X,Y,Z",
      .help = "a light at a place in mm instead; inverse square, 1 at the origin"},
+    {.key = "lamp",
+     .type = WEFT_FIELD_TEXTS,
+     .offset = offsetof(preview_args, lamps),
+     .unit = "LAMP",
+     .help = "in place of --light, several times: AZ,EL or mm:X,Y,Z or ball:X,Y,Z,R or tube:X,Y,Z,X,Y,Z, "
+             "with ,STRENGTH; none: no lamp"},
+    {.key = "area",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, area),
+     .choices = "points|representative",
+     .def = "points",
+     .help = "balls and tubes as 24 points, or as the one point of Unreal's notes"},
+    {.key = "env",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(preview_args, env),
+     .unit = "FILE",
+     .help = "light from all round: an equirectangular panorama, EXR, or PNG or TIFF in sRGB"},
+    {.key = "sky",
+     .type = WEFT_FIELD_F64S,
+     .offset = offsetof(preview_args, sky),
+     .unit = "AZ,EL",
+     .help = "light from a clear sky with the sun there (its disc is a --lamp): a level white card reads 1"},
+    {.key = "sky-model",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, sky_model),
+     .choices = "cie-clear|far-cry-3",
+     .def = "cie-clear",
+     .help = "the constants of the sky"},
+    {.key = "env-scale",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, env_scale),
+     .min = 0,
+     .max = 1e6,
+     .def = "1",
+     .help = "factor on the light of --env and --sky"},
+    {.key = "tone",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, tone),
+     .choices = weft_tone_names,
+     .def = "none",
+     .help = "tone curve: cut at white, or like ACES or AgX"},
+    {.key = "sweep",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, sweep),
+     .min = 0,
+     .max = 999,
+     .def = "0",
+     .help = "so many pictures NAME-000.png on, the lamps going once round the z axis"},
+    {.key = "columns",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(preview_args, columns),
+     .unit = "WHAT",
+     .help = "a grid: a row for each model of --brdf A,B, a column for each lamp (\"lamps\") or NAME=V,V"},
     {.key = "shape",
      .type = WEFT_FIELD_CHOICE,
      .offset = offsetof(preview_args, shape),
-     .choices = "plane|sphere",
+     .choices = "plane|sphere|cylinder|drape",
      .def = "plane",
-     .help = "as it lies, or on a ball"},
+     .help = "as it lies, on a ball, round a roll, or hung in folds"},
     {.key = "size",
      .type = WEFT_FIELD_SIZE,
      .offset = offsetof(preview_args, size),
@@ -122,7 +179,7 @@ static weft_err set_light(weft_preview_light *light, const preview_args *a, weft
         if (a->light_mm.n != 3 ||
             !(hypot(hypot(a->light_mm.values[0], a->light_mm.values[1]), a->light_mm.values[2]) > 0))
             return weft_fail(err, WEFT_ERR_USAGE, "--light-mm wants X,Y,Z away from the origin");
-        light->is_point = true;
+        light->kind = WEFT_PREVIEW_POINT;
         for (int c = 0; c < 3; c++)
             light->position_mm[c] = a->light_mm.values[c];
         return WEFT_OK;
@@ -151,7 +208,9 @@ static weft_size picture_size(const preview_args *a, const weft_preview_crop *sh
 {
     if (a->size.width)
         return a->size;
-    if (a->shape == WEFT_PREVIEW_SPHERE)
+    if (a->columns)
+        return (weft_size){240, 240};
+    if (a->shape != WEFT_PREVIEW_PLANE)
         return (weft_size){768, 768};
     const int longest = shown->width > shown->height ? shown->width : shown->height;
     const double scale = longest > LONGEST_SIDE ? (double)LONGEST_SIDE / longest : 1;
@@ -170,30 +229,136 @@ static weft_err report(const weft_invocation *inv, const preview_args *a, weft_s
     return WEFT_OK;
 }
 
-/* Renders and writes; `view` has its light and crop. */
-static weft_err look(const preview_args *a, const weft_preview_input *input, weft_preview_view *view,
-                     double *seconds, weft_error *err)
+static weft_err write_picture(const preview_args *a, const char *path, weft_image *picture, weft_error *err)
+{
+    weft_tone_image((weft_tone)a->tone, picture);
+    return weft_image_write(path, picture, 8, WEFT_TRANSFER_SRGB, err);
+}
+
+/* Renders and writes one picture. */
+static weft_err look(const preview_args *a, const char *path, const weft_preview_input *input,
+                     const weft_preview_view *view, double *seconds, weft_error *err)
 {
     weft_image picture;
-    weft_preview_crop shown = view->crop;
     struct timespec begin, end;
-    if (shown.width == 0)
-        WEFT_TRY(weft_preview_whole(&input->surface, &shown, err));
-    const weft_size size = picture_size(a, &shown);
-    view->width = size.width;
-    view->height = size.height;
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    WEFT_TRY(weft_preview_render(&input->surface, view, &picture, err));
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    *seconds += (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+    const weft_err status = write_picture(a, path, &picture, err);
+    weft_image_fini(&picture);
+    return status;
+}
+
+static void turn(double v[3], double angle)
+{
+    const double x = v[0], y = v[1];
+    v[0] = cos(angle) * x - sin(angle) * y;
+    v[1] = sin(angle) * x + cos(angle) * y;
+}
+
+/* "ball.png" is ball-000.png, ball-001.png, ... with the lamps turned a step each. */
+static weft_err sweep(const weft_invocation *inv, const preview_args *a, const weft_preview_input *input,
+                      weft_preview_view *view, double *seconds, weft_error *err)
+{
+    const char *const dot = strrchr(weft_path_name(a->output), '.');
+    const int stem = (int)(dot ? (size_t)(dot - a->output) : strlen(a->output));
+    for (int frame = 0; frame < a->sweep; frame++) {
+        char *const path = weft_asprintf(err, "%.*s-%03d%s", stem, a->output, frame, dot ? dot : "");
+        weft_err status = path ? weft_file_refuse_existing(path, inv->force, err) : WEFT_ERR_NOMEM;
+        if (status == WEFT_OK)
+            status = look(a, path, input, view, seconds, err);
+        weft_free(path);
+        WEFT_TRY(status);
+        for (int k = 0; k < view->n_lights; k++) {
+            const double step = 2 * 3.14159265358979323846 / a->sweep;
+            turn(view->lights[k].direction, step);
+            turn(view->lights[k].position_mm, step);
+            turn(view->lights[k].end_mm, step);
+        }
+    }
+    return WEFT_OK;
+}
+
+/* Lights, crop and all that does not depend on the input. */
+static weft_err set_view(const preview_args *a, weft_preview_view *view, weft_error *err)
+{
+    const bool none = a->lamps.n == 1 && strcmp(a->lamps.values[0], "none") == 0;
+    if (a->lamps.n > WEFT_PREVIEW_MAX_LIGHTS)
+        return weft_fail(err, WEFT_ERR_USAGE, "at most %d lamps can shine", WEFT_PREVIEW_MAX_LIGHTS);
+    if (a->env && a->sky.n)
+        return weft_fail(err, WEFT_ERR_USAGE, "--env and --sky are two ways to say the same thing");
+    if (a->lamps.n == 0)
+        WEFT_TRY(set_light(&view->lights[0], a, err));
+    for (int k = 0; k < a->lamps.n && !none; k++)
+        WEFT_TRY(weft_preview_lamp(a->lamps.values[k], &view->lights[k], err));
+    view->n_lights = none ? 0 : a->lamps.n ? a->lamps.n : 1;
+    for (int k = 0; k < view->n_lights; k++)
+        view->lights[k].area = (weft_preview_area)a->area;
+    WEFT_TRY(set_crop(&view->crop, &a->crop, err));
     view->shape = (weft_preview_shape)a->shape;
     view->exposure_ev = a->exposure_ev;
     view->ambient = a->ambient;
     view->background = a->background;
     view->repeat = a->repeat;
     view->fov_deg = a->fov_deg;
-    clock_gettime(CLOCK_MONOTONIC, &begin);
-    WEFT_TRY(weft_preview_render(&input->surface, view, &picture, err));
-    clock_gettime(CLOCK_MONOTONIC, &end);
-    *seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
-    const weft_err status = weft_image_write(a->output, &picture, 8, WEFT_TRANSFER_SRGB, err);
-    weft_image_fini(&picture);
+    return WEFT_OK;
+}
+
+static double texels_per_px(const preview_args *a, const weft_preview_surface *surface, weft_size size)
+{
+    const double side = size.width < size.height ? size.width : size.height;
+    const double shorter = surface->width < surface->height ? surface->width : surface->height;
+    if (a->shape != WEFT_PREVIEW_PLANE)
+        return a->repeat * shorter / side;
+    return fmax((double)surface->width / size.width, (double)surface->height / size.height);
+}
+
+static weft_err look_at_input(const weft_invocation *inv, const preview_args *a, weft_preview_view *view,
+                              double *seconds, weft_error *err)
+{
+    weft_preview_input input;
+    weft_preview_crop shown = view->crop;
+    const char *const folder = inv->n_operands ? inv->operands[0] : NULL;
+    WEFT_TRY(weft_preview_input_load(&input, folder, a->brdf, &a->params, err));
+    weft_err status = WEFT_OK;
+    if (a->match) {
+        status = weft_preview_match(inv, &input, a->match, a->cal, a->output, err);
+        weft_preview_input_fini(&input);
+        return status;
+    }
+    if (shown.width == 0)
+        status = weft_preview_whole(&input.surface, &shown, err);
+    const weft_size size = picture_size(a, &shown);
+    view->width = size.width;
+    view->height = size.height;
+    if (status == WEFT_OK && view->crop.width == 0)
+        status = weft_preview_input_level(&input, texels_per_px(a, &input.surface, size), err);
+    if (status == WEFT_OK)
+        status = a->sweep ? sweep(inv, a, &input, view, seconds, err)
+                          : look(a, a->output, &input, view, seconds, err);
+    weft_preview_input_fini(&input);
+    return status == WEFT_OK || !folder ? status : weft_prefix(err, status, "%s", folder);
+}
+
+static weft_err look_at_grid(const weft_invocation *inv, const preview_args *a, weft_preview_view *view,
+                             weft_error *err)
+{
+    weft_image sheet;
+    const weft_size size = picture_size(a, NULL);
+    view->width = size.width;
+    view->height = size.height;
+    const weft_preview_grid grid = {inv->n_operands ? inv->operands[0] : NULL,
+                                    a->brdf,
+                                    &a->params,
+                                    &a->lamps,
+                                    a->columns,
+                                    (weft_tone)a->tone};
+    WEFT_TRY(weft_preview_grid_render(&grid, view, &sheet, err));
+    view->width = sheet.width;
+    view->height = sheet.height;
+    const weft_err status = weft_image_write(a->output, &sheet, 8, WEFT_TRANSFER_SRGB, err);
+    weft_image_fini(&sheet);
     return status;
 }
 
@@ -201,38 +366,44 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
 {
     const preview_args *const a = args;
     weft_preview_view view = weft_preview_view_defaults();
-    weft_preview_input input;
-    double seconds;
-    WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
-    WEFT_TRY(set_light(&view.light, a, err));
-    WEFT_TRY(set_crop(&view.crop, &a->crop, err));
+    weft_preview_around around = {0};
+    double seconds = 0;
     if (!a->match != !a->cal)
         return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
-    WEFT_TRY(weft_preview_input_load(&input, inv->operands[0], a->brdf, &a->params, err));
-    if (a->match) {
-        const weft_err matched = weft_preview_match(inv, &input, a->match, a->cal, a->output, err);
-        weft_preview_input_fini(&input);
-        return matched;
+    if (a->match && !inv->n_operands)
+        return weft_fail(err, WEFT_ERR_USAGE, "--match wants the INPUT that was solved from the set");
+    if (!a->sweep)
+        WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
+    WEFT_TRY(set_view(a, &view, err));
+    if (a->env || a->sky.n) {
+        WEFT_TRY(weft_preview_around_init(
+            &around, a->env, &a->sky, a->sky_model == 0 ? &weft_sky_cie_clear : &weft_sky_far_cry_3, err));
+        view.surroundings = (weft_preview_surroundings){&around.map, &around.table, a->env_scale};
     }
-    const weft_err status = look(a, &input, &view, &seconds, err);
-    weft_preview_input_fini(&input);
-    if (status != WEFT_OK)
-        return weft_prefix(err, status, "%s", inv->operands[0]);
-    return report(inv, a, (weft_size){view.width, view.height}, seconds, err);
+    const weft_err status =
+        a->columns ? look_at_grid(inv, a, &view, err) : look_at_input(inv, a, &view, &seconds, err);
+    weft_preview_around_fini(&around);
+    WEFT_TRY(status);
+    return a->match ? WEFT_OK : report(inv, a, (weft_size){view.width, view.height}, seconds, err);
 }
 
 const weft_command weft_cmd_preview = {
     .name = "preview",
-    .summary = "look at solved maps under a light that can be moved",
-    .operands = "INPUT",
-    .min_operands = 1,
+    .summary = "look at solved maps or a material under lights that can be moved",
+    .operands = "[INPUT]",
+    .min_operands = 0,
     .max_operands = 1,
     .args_size = sizeof(preview_args),
     .fields = fields,
     .details =
-        "INPUT is a folder of solved maps (NAME.maps).  The albedo map is the model's albedo; other\n"
-        "parameters are constants unless a picture of the same size is given for them.  Nothing is tone\n"
-        "mapped: values above white are cut.",
+        "INPUT is a folder of solved maps (NAME.maps) or a baked material (NAME.material); without it a "
+        "smooth\n"
+        "surface is shown, of which a ball has a radius of 50 mm.  The albedo map is the model's albedo; a\n"
+        "material gives f0, alpha and tints too, from the mip that fits.  Other parameters are constants "
+        "unless\n"
+        "a picture of the same size is given for them.  Positions of lamps are in mm, from the world's "
+        "origin\n"
+        "on a plane, from the middle of the other shapes.",
     .example =
         "weft preview twill.maps -o twill.png --brdf cloth --param f0=0.1 --shape sphere --light 60,30",
     .run = run,

@@ -4,6 +4,8 @@
 #include "core/formats/image_file.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "shading/bake/material_file.h"
+#include "shading/brdf/half_vector.h"
 
 #include <string.h>
 
@@ -61,15 +63,115 @@ static weft_err make_surface(weft_preview_input *input, const char *folder, cons
     return WEFT_OK;
 }
 
+/* Which of a material's maps is which parameter. */
+static const struct {
+    const char *param;
+    weft_baked_kind kind;
+} material_params[] = {
+    {"albedo", WEFT_BAKED_ALBEDO},         {"base", WEFT_BAKED_ALBEDO},
+    {"f0", WEFT_BAKED_SPECULAR},           {"alpha", WEFT_BAKED_ROUGHNESS},
+    {"anisotropy", WEFT_BAKED_ANISOTROPY}, {"front", WEFT_BAKED_FRONT_TINT},
+    {"rim", WEFT_BAKED_RIM_TINT},          {"amplitude", WEFT_BAKED_RIM_AMPLITUDE},
+};
+
+static void use_material_map(weft_preview_surface *surface, const char *param, const weft_baked_map *map,
+                             int planes, int level)
+{
+    int plane = 0;
+    const weft_brdf_param *const row = weft_brdf_find_param(surface->brdf, param, &plane);
+    if (!row || (row->components == 1 && planes == 3 && strcmp(param, "f0") != 0))
+        return;
+    for (int c = 0; c < row->components; c++) {
+        const double value = (double)map->constant[planes == 3 ? c : 0];
+        surface->params[plane + c] = value < row->min ? row->min : value > row->max ? row->max : value;
+        surface->maps[plane + c] =
+            map->n_mips ? (weft_preview_map){&map->mips[level], planes == 3 ? c : 0} : (weft_preview_map){0};
+    }
+}
+
+/* Points the surface at one level of the material. */
+static weft_err use_level(weft_preview_input *input, int level, weft_error *err)
+{
+    weft_baked *const baked = &input->baked;
+    weft_preview_surface *const surface = &input->surface;
+    const weft_baked_map *const normal = &baked->maps[WEFT_BAKED_NORMAL];
+    surface->width = baked->width >> level > 0 ? baked->width >> level : 1;
+    surface->height = baked->height >> level > 0 ? baked->height >> level : 1;
+    surface->mm_per_px = baked->size_mm[0] / surface->width;
+    surface->origin_mm[0] = -0.5 * (surface->width - 1) * surface->mm_per_px;
+    surface->origin_mm[1] = 0.5 * (surface->height - 1) * surface->mm_per_px;
+    surface->normal = normal->n_mips ? &normal->mips[level] : NULL;
+    for (size_t i = 0; i < sizeof material_params / sizeof material_params[0]; i++) {
+        const weft_baked_kind kind = material_params[i].kind;
+        use_material_map(surface, material_params[i].param, &baked->maps[kind], weft_baked_rows[kind].planes,
+                         level);
+    }
+    for (int i = 0; i < input->params.n; i++)
+        WEFT_TRY(set_param(input, input->params.values[i], err));
+    return WEFT_OK;
+}
+
+static weft_err load_material(weft_preview_input *input, const char *folder, const char *brdf,
+                              weft_error *err)
+{
+    WEFT_TRY(weft_material_load(folder, &input->baked, err));
+    WEFT_TRY(weft_brdf_find(brdf, &input->surface.brdf, err));
+    weft_brdf_defaults(input->surface.brdf, input->surface.params);
+    return use_level(input, 0, err);
+}
+
+static weft_err make_even(weft_preview_input *input, const char *brdf, weft_error *err)
+{
+    enum { SIDE = 64 };
+    const double mm_per_px = 50 * WEFT_PI / SIDE, corner = 0.5 * (SIDE - 1) * mm_per_px;
+    input->surface = (weft_preview_surface){
+        .width = SIDE, .height = SIDE, .mm_per_px = mm_per_px, .origin_mm = {-corner, corner}};
+    WEFT_TRY(weft_brdf_find(brdf, &input->surface.brdf, err));
+    weft_brdf_defaults(input->surface.brdf, input->surface.params);
+    for (int i = 0; i < input->params.n; i++)
+        WEFT_TRY(set_param(input, input->params.values[i], err));
+    return WEFT_OK;
+}
+
+static bool is_material(const char *folder)
+{
+    char *const file = weft_path_join(folder, "material.json", NULL);
+    const bool found = file && weft_file_exists(file);
+    weft_free(file);
+    return found;
+}
+
 weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, const char *brdf,
                                  const weft_texts *params, weft_error *err)
 {
-    *input = (weft_preview_input){0};
-    WEFT_TRY(weft_maps_load(folder, &input->maps, err));
-    const weft_err status = make_surface(input, folder, brdf, params, err);
+    weft_err status;
+    *input = (weft_preview_input){.params = *params};
+    if (!folder) {
+        status = make_even(input, brdf, err);
+    } else if (is_material(folder)) {
+        status = load_material(input, folder, brdf, err);
+    } else {
+        status = weft_maps_load(folder, &input->maps, err);
+        if (status == WEFT_OK)
+            status = make_surface(input, folder, brdf, params, err);
+    }
     if (status != WEFT_OK)
         weft_preview_input_fini(input);
     return status;
+}
+
+weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_px, weft_error *err)
+{
+    int level = 0;
+    if (!input->baked.width || input->n_extra)
+        return WEFT_OK; /* pictures given for parameters have one size only */
+    const int levels = weft_baked_levels(input->baked.width, input->baked.height);
+    for (double t = texels_per_px; t > 1 && level < levels - 1; t /= 2)
+        level++;
+    for (int k = 0; k < WEFT_BAKED_COUNT; k++)
+        if (input->baked.maps[k].n_mips && level > input->baked.maps[k].n_mips - 1)
+            level = input->baked.maps[k].n_mips - 1;
+    return use_level(input, level, err);
 }
 
 void weft_preview_input_fini(weft_preview_input *input)
@@ -77,6 +179,7 @@ void weft_preview_input_fini(weft_preview_input *input)
     for (int i = 0; i < input->n_extra; i++)
         weft_image_fini(&input->extra[i]);
     weft_maps_fini(&input->maps);
+    weft_baked_fini(&input->baked);
     *input = (weft_preview_input){0};
 }
 
@@ -87,8 +190,8 @@ char *weft_preview_title(const char *folder, weft_error *err)
         return NULL;
     for (size_t n = strlen(path); n > 1 && path[n - 1] == '/'; n--)
         path[n - 1] = '\0';
-    static const char *const endings[] = {".maps", ".set"};
-    for (int i = 0; i < 2; i++)
+    static const char *const endings[] = {".maps", ".set", ".material"};
+    for (int i = 0; i < 3; i++)
         if (weft_path_has_suffix(path, endings[i]) && strlen(weft_path_name(path)) > strlen(endings[i]))
             path[strlen(path) - strlen(endings[i])] = '\0';
     char *const title = weft_strdup(weft_path_name(path), err);

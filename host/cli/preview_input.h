@@ -4,24 +4,34 @@
 
 #include "core/fields.h"
 #include "host/set/maps.h"
+#include "shading/bake/baked.h"
 #include "shading/preview/preview.h"
 
-/** Maps in memory and the surface that borrows them. */
+/** What is looked at in memory, and the surface that borrows it. */
 typedef struct weft_preview_input {
-    weft_maps maps;
+    weft_maps maps;   /* of a maps folder */
+    weft_baked baked; /* of a material */
+    weft_texts params;
     int n_extra;
     weft_image extra[WEFT_TEXTS_MAX]; /* maps of parameters: --param alpha=roughness.exr */
     weft_preview_surface surface;
 } weft_preview_input;
 
 /**
- * Loads a maps folder for a model.
+ * Loads solved maps (NAME.maps) or a baked material (NAME.material) for a model.
  *
+ * @param folder  NULL: a smooth even surface of the model's parameters, a ball of which has a radius of 50 mm
  * @param params  "name=0.3", "name=r,g,b", or "name=FILE" (EXR, or PNG/TIFF as linear 0..1) of the same size
- * The albedo map becomes the parameter "albedo" where the model has one.
+ * The albedo map becomes the parameter "albedo" where the model has one; a material also gives "f0" (from
+ * specular), "alpha" (from roughness), "anisotropy", "front" and "rim".
  */
 weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, const char *brdf,
                                  const weft_texts *params, weft_error *err);
+
+/** Shows a level of a material's mips, the first with at most `texels_per_px` texels a pixel; its roughness
+ *  answers for the normals that it averages.  Does nothing to maps.  Before this it is level 0. */
+weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_px, weft_error *err);
+
 void weft_preview_input_fini(weft_preview_input *input);
 
 /** Last part of a path, without trailing slashes and without ".maps" or ".set"; on the heap. */

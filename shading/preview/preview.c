@@ -18,10 +18,10 @@ void weft_preview_direction(double azimuth_deg, double elevation_deg, double dir
 
 weft_preview_view weft_preview_view_defaults(void)
 {
-    weft_preview_view view = {.width = 512, .height = 512, .background = 0.18, .repeat = 1};
-    weft_preview_direction(135, 45, view.light.direction);
+    weft_preview_view view = {.width = 512, .height = 512, .n_lights = 1, .background = 0.18, .repeat = 1};
+    weft_preview_direction(135, 45, view.lights[0].direction);
     for (int c = 0; c < 3; c++)
-        view.light.irradiance[c] = WEFT_PI;
+        view.lights[0].irradiance[c] = WEFT_PI;
     return view;
 }
 
@@ -51,14 +51,14 @@ weft_err weft_preview_set_map(weft_preview_surface *surface, const char *name, c
     return WEFT_OK;
 }
 
-/* Light and view in the frame of the shading normal, whose tangent stays in the plane of the map's X. */
+/* The frame of the shading normal, whose tangent stays in the plane of the map's X, and the view in it. */
 WEFT_CLONES
-static void turn_to_local(weft_preview_samples *s)
+static void set_frame(weft_preview_samples *s)
 {
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
         const double x = s->normal[0][i], y = s->normal[1][i], z = s->normal[2][i];
-        double n[3], t[3], local_l[3] = {0}, local_v[3] = {0};
+        double n[3], t[3], local[3] = {0};
         for (int c = 0; c < 3; c++)
             n[c] = x * s->axis[0][c][i] + y * s->axis[1][c][i] + z * s->axis[2][c][i];
         /* tangent less its part along n; x is that part, for the axes are orthonormal */
@@ -67,83 +67,57 @@ static void turn_to_local(weft_preview_samples *s)
             t[c] = (s->axis[0][c][i] - x * n[c]) * inverse;
         const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
         for (int c = 0; c < 3; c++) {
-            const double l = s->lamp[c][i], v = s->eye[c][i];
-            local_l[0] += l * t[c];
-            local_l[1] += l * b[c];
-            local_l[2] += l * n[c];
-            local_v[0] += v * t[c];
-            local_v[1] += v * b[c];
-            local_v[2] += v * n[c];
+            const double v = s->eye[c][i];
+            local[0] += v * t[c];
+            local[1] += v * b[c];
+            local[2] += v * n[c];
+            s->frame[0][c][i] = t[c];
+            s->frame[1][c][i] = b[c];
+            s->frame[2][c][i] = n[c];
         }
-        for (int c = 0; c < 3; c++) {
-            s->light[c][i] = local_l[c];
-            s->view[c][i] = local_v[c];
-        }
+        for (int c = 0; c < 3; c++)
+            s->view[c][i] = local[c];
     }
 }
 
-/* World direction to the light and its irradiance at each sample, as a share of that at the middle. */
-static void aim(const weft_preview_setup *setup, weft_preview_samples *s)
+WEFT_CLONES
+void weft_preview_turn_lamp(weft_preview_samples *s)
 {
-    const weft_preview_light *const from = &setup->view->light;
-    for (int i = 0; i < s->n; i++) {
-        double d[3], share = 1;
-        for (int c = 0; c < 3; c++)
-            d[c] = from->is_point ? from->position_mm[c] - s->position_mm[c][i] : from->direction[c];
-        if (from->is_point) {
-            const double *const p = from->position_mm;
-            const double r2 = weft_max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1e-6);
-            share = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / r2;
-            for (int c = 0; c < 3; c++)
-                d[c] /= sqrt(r2);
-        }
-        for (int c = 0; c < 3; c++)
-            s->lamp[c][i] = d[c];
-        s->irradiance[i] = share;
+    for (int a = 0; a < 3; a++) {
+        WEFT_INDEPENDENT
+        for (int i = 0; i < s->n; i++)
+            s->light[a][i] = s->lamp[0][i] * s->frame[a][0][i] + s->lamp[1][i] * s->frame[a][1][i] +
+                             s->lamp[2][i] * s->frame[a][2][i];
     }
 }
 
-/*
- * How much of the light the shape itself lets through where a bumpy normal still faces it.
- *
- * A plane shadows nothing until the light is below it.  On the sphere a hard cut at the terminator would
- * show as a line across the bumps; the soft one is Chiang et al. 2019 ("Taming the shadow terminator"):
- * S = -G^3 + G^2 + G with G = min(1, (g.l)/((n.l)(g.n))), g the normal of the shape.
- */
-static double shape_shadow(const weft_preview_setup *setup, double gl, double nl, double gn)
+void weft_preview_eval(const weft_preview_setup *setup, weft_preview_samples *s,
+                       double value[3][WEFT_PREVIEW_RUN])
 {
-    if (gl <= 0 || nl <= 0)
-        return 0;
-    if (setup->view->shape == WEFT_PREVIEW_PLANE)
-        return 1;
-    const double product = nl * weft_max(gn, 1e-3), g = gl < product ? gl / product : 1;
-    return g * (1 + g * (1 - g));
+    weft_brdf_batch batch = {.n = s->n,
+                             .light = {s->light[0], s->light[1], s->light[2]},
+                             .view = {s->view[0], s->view[1], s->view[2]}};
+    double *const to[3] = {value[0], value[1], value[2]};
+    for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
+        batch.param[k] = s->param[k];
+    setup->surface->brdf->eval(&batch, to);
 }
 
 static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_view *const view = setup->view;
-    weft_brdf_batch batch = {.n = s->n,
-                             .light = {s->light[0], s->light[1], s->light[2]},
-                             .view = {s->view[0], s->view[1], s->view[2]}};
-    double *const value[3] = {s->value[0], s->value[1], s->value[2]};
-    for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
-        batch.param[k] = s->param[k];
-    aim(setup, s);
-    turn_to_local(s);
-    setup->surface->brdf->eval(&batch, value);
-    for (int i = 0; i < s->n; i++) {
-        const double gl = s->lamp[0][i] * s->axis[2][0][i] + s->lamp[1][i] * s->axis[2][1][i] +
-                          s->lamp[2][i] * s->axis[2][2][i];
-        s->irradiance[i] *=
-            weft_max(s->light[2][i], 0) * shape_shadow(setup, gl, s->light[2][i], s->normal[2][i]);
-    }
     const double exposure = exp2(view->exposure_ev);
+    set_frame(s);
+    for (int c = 0; c < 3; c++)
+        memset(s->radiance[c], 0, sizeof s->radiance[c]);
+    for (int k = 0; k < view->n_lights; k++)
+        weft_preview_add_light(setup, &view->lights[k], s);
+    if (view->surroundings.map)
+        weft_preview_add_surroundings(setup, s);
     for (int c = 0; c < 3; c++) {
         const double *const albedo = setup->albedo_plane >= 0 ? s->param[setup->albedo_plane + c] : NULL;
         for (int i = 0; i < s->n; i++) {
-            const double sky = albedo ? view->ambient * albedo[i] : 0;
-            const double lit = s->value[c][i] * s->irradiance[i] * view->light.irradiance[c] + sky;
+            const double lit = s->radiance[c][i] + (albedo ? view->ambient * albedo[i] : 0);
             s->value[c][i] = s->hit[i] > 0 ? exposure * lit : view->background;
         }
     }
@@ -262,10 +236,14 @@ static weft_err check_surface(const weft_preview_surface *surface, const weft_pr
     if (surface->mask && (surface->mask->width != surface->width || surface->mask->height != surface->height))
         return weft_fail(err, WEFT_ERR_MISMATCH, "the mask has %d x %d pixels, the maps %d x %d",
                          surface->mask->width, surface->mask->height, surface->width, surface->height);
-    if (view->light.is_point && !(surface->mm_per_px > 0))
-        return weft_fail(err, WEFT_ERR_MISSING,
-                         "a light at a position in mm needs maps with a scale; these have none (solve with "
-                         "--geometry plane, or give the light as azimuth and elevation)");
+    if (view->n_lights < 0 || view->n_lights > WEFT_PREVIEW_MAX_LIGHTS)
+        return weft_fail(err, WEFT_ERR_RANGE, "%d lights; at most %d can shine", view->n_lights,
+                         WEFT_PREVIEW_MAX_LIGHTS);
+    for (int k = 0; k < view->n_lights; k++)
+        if (view->lights[k].kind != WEFT_PREVIEW_DISTANT && !(surface->mm_per_px > 0))
+            return weft_fail(err, WEFT_ERR_MISSING,
+                             "a light at a position in mm needs maps with a scale; these have none (solve "
+                             "with --geometry plane, or give the light as azimuth and elevation)");
     if (!(view->repeat > 0 && view->repeat <= 1000) || !(view->fov_deg >= 0 && view->fov_deg < 170))
         return weft_fail(err, WEFT_ERR_RANGE, "wanted a repeat of more than 0 and a field of view below 170");
     return WEFT_OK;
@@ -290,10 +268,12 @@ static void set_ranges(weft_preview_setup *setup)
 {
     const weft_brdf *const brdf = setup->surface->brdf;
     int plane = 0;
-    setup->albedo_plane = -1;
+    setup->albedo_plane = setup->alpha_plane = -1;
     for (const weft_brdf_param *p = brdf->params; p->name; p++) {
         if (strcmp(p->name, "albedo") == 0 && p->components == 3)
             setup->albedo_plane = plane;
+        if (strcmp(p->name, "alpha") == 0)
+            setup->alpha_plane = plane;
         for (int c = 0; c < p->components; c++, plane++) {
             setup->low[plane] = p->min;
             setup->high[plane] = p->max;

@@ -15,23 +15,61 @@
 #include "core/error.h"
 #include "core/image.h"
 #include "shading/brdf/brdf.h"
+#include "shading/lighting/environment_map.h"
+#include "shading/lighting/environment_table.h"
 
 #include <stdbool.h>
 
 typedef enum weft_preview_shape {
-    WEFT_PREVIEW_PLANE,  /* the map as it lies, whole, aspect kept */
-    WEFT_PREVIEW_SPHERE, /* the map wrapped on a ball from the pole that faces the viewer, equidistant along
-                            meridians; repeats mirrored */
+    WEFT_PREVIEW_PLANE,    /* the map as it lies, whole, aspect kept */
+    WEFT_PREVIEW_SPHERE,   /* the map wrapped on a ball from the pole that faces the viewer, equidistant along
+                              meridians; repeats mirrored */
+    WEFT_PREVIEW_CYLINDER, /* wrapped round an upright roll, true to length; repeats mirrored */
+    WEFT_PREVIEW_DRAPE,    /* hung in folds that deepen downwards, true to length across them; each fold keeps
+                              the light from the next */
 } weft_preview_shape;
 
-/** The light: distant, or a point near the surface. */
+typedef enum weft_preview_light_kind {
+    WEFT_PREVIEW_DISTANT,
+    WEFT_PREVIEW_POINT,
+    WEFT_PREVIEW_BALL, /* a sphere of even radiance around position_mm */
+    WEFT_PREVIEW_TUBE, /* from position_mm to end_mm, as strong at every place */
+} weft_preview_light_kind;
+
+/** How balls and tubes are summed. */
+typedef enum weft_preview_area {
+    WEFT_PREVIEW_POINTS,         /* WEFT_PREVIEW_AREA_POINTS points of it, each shaded: any model, right */
+    WEFT_PREVIEW_REPRESENTATIVE, /* one point for the highlight, its middle for the matte part (S-UE4-16,
+                                    S-UE4-17): models with albedo and alpha, or alpha alone */
+} weft_preview_area;
+
+#define WEFT_PREVIEW_AREA_POINTS 24
+#define WEFT_PREVIEW_MAX_LIGHTS  16
+
 typedef struct weft_preview_light {
-    bool is_point;
+    weft_preview_light_kind kind;
+    weft_preview_area area;
     double direction[3];   /* distant: unit, towards the light */
-    double position_mm[3]; /* point: in the world of the plane, or from the middle of the sphere; it gives
-                              the irradiance below at the origin and falls with the square of the distance */
+    double position_mm[3]; /* in the world of the plane, or from the middle of the other shapes; the light
+                              gives the irradiance below at the origin and falls with the square of the
+                              distance */
+    double end_mm[3];      /* tube */
+    double radius_mm;      /* ball; less than the distance of everything it shines on */
     double irradiance[3];  /* of a surface that faces the light, linear RGB; pi makes a white card read 1 */
 } weft_preview_light;
+
+/**
+ * Light from all round.  Its zenith is +Z over the plane (the cloth lies on the ground) and +Y for the other
+ * shapes, whose background is then the middle of the panorama.
+ *
+ * GGX models are lit by the split sum; the others by 32 directions of the cosine hemisphere with the
+ * light in three bands: right for wide lobes, too soft for mirrors.
+ */
+typedef struct weft_preview_surroundings {
+    const weft_environment_map *map; /* NULL: none */
+    const weft_environment_table *table;
+    double scale; /* on all of its light */
+} weft_preview_surroundings;
 
 /** Unit vector to a light at `azimuth_deg` from +X (90 is +Y) and `elevation_deg` above the plane. */
 void weft_preview_direction(double azimuth_deg, double elevation_deg, double direction[3]);
@@ -72,7 +110,9 @@ weft_err weft_preview_whole(const weft_preview_surface *surface, weft_preview_cr
 typedef struct weft_preview_view {
     int width, height;
     weft_preview_shape shape;
-    weft_preview_light light;
+    int n_lights;
+    weft_preview_light lights[WEFT_PREVIEW_MAX_LIGHTS];
+    weft_preview_surroundings surroundings;
     double ambient;         /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
     double exposure_ev;     /* the picture is multiplied by 2^exposure_ev */
     double background;      /* linear grey, not exposed */
@@ -81,7 +121,7 @@ typedef struct weft_preview_view {
     double fov_deg;         /* 0: orthographic; else the camera's field of view over the shorter side */
 } weft_preview_view;
 
-/** 512 x 512, plane, light from the upper left at 45 degrees, ambient 0, background 0.18, repeat 1. */
+/** 512 x 512, plane, one light from the upper left at 45 degrees, ambient 0, background 0.18, repeat 1. */
 weft_preview_view weft_preview_view_defaults(void);
 
 /**
@@ -89,7 +129,7 @@ weft_preview_view weft_preview_view_defaults(void);
  *
  * @param picture  uninitialised; gets 3 planes, linear, not clamped above 1
  * @return WEFT_ERR_RANGE, WEFT_ERR_MISMATCH for maps of different sizes, WEFT_ERR_MISSING for a point light
- *         over a map without scale, WEFT_ERR_NODATA for an empty mask, WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
+ *         over a map of unknown scale, WEFT_ERR_NODATA for an empty mask, WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
  */
 weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
                              weft_image *picture, weft_error *err);

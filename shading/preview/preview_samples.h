@@ -14,6 +14,7 @@ typedef struct weft_preview_samples {
     double position_mm[3][WEFT_PREVIEW_RUN];         /* world; 0 where the maps have no scale */
     double axis[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the shape */
     double eye[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the viewer */
+    double frame[3][3][WEFT_PREVIEW_RUN];            /* world: tangent, bitangent, normal of the map */
     double lamp[3][WEFT_PREVIEW_RUN];                /* world, unit, towards the light */
     int at[4][WEFT_PREVIEW_RUN];                     /* the four texels around the place, index in a plane */
     double share[4][WEFT_PREVIEW_RUN];               /* of each; masked ones have none */
@@ -22,7 +23,10 @@ typedef struct weft_preview_samples {
     double param[WEFT_BRDF_MAX_PLANES][WEFT_PREVIEW_RUN];
     double light[3][WEFT_PREVIEW_RUN], view[3][WEFT_PREVIEW_RUN]; /* local frame of the shading normal */
     double irradiance[WEFT_PREVIEW_RUN];                          /* share of the light's, with the cosine */
-    double value[3][WEFT_PREVIEW_RUN];                            /* BRDF, then radiance */
+    double norm[WEFT_PREVIEW_RUN];                                /* of the lobe, for representative points */
+    double value[3][WEFT_PREVIEW_RUN];                            /* BRDF */
+    double matte[3][WEFT_PREVIEW_RUN];                            /* BRDF without its mirrored part */
+    double radiance[3][WEFT_PREVIEW_RUN];                         /* so far */
 } weft_preview_samples;
 
 /** What is the same for all samples of a picture. */
@@ -36,6 +40,7 @@ typedef struct weft_preview_setup {
     double radius_texels; /* sphere: of the sphere, map pixels */
     double eye_distance;  /* 0: orthographic; plane: output pixels, sphere: radii */
     int albedo_plane;     /* first plane of the parameter "albedo"; -1 when the model has none */
+    int alpha_plane;      /* of "alpha"; -1 when the model has none */
     double low[WEFT_BRDF_MAX_PLANES], high[WEFT_BRDF_MAX_PLANES]; /* ranges of the parameters */
 } weft_preview_setup;
 
@@ -44,6 +49,24 @@ void weft_preview_setup_shape(weft_preview_setup *setup);
 
 /** Fills hit, u, v, position, axis and eye from x and y. */
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s);
+
+/** Share of the light that reaches a place of the drape past the other folds: 1 or 0. */
+double weft_preview_drape_light(const weft_preview_setup *setup, const double position_px[3],
+                                const double lamp[3]);
+
+/** Shades the samples under one light of the view and adds to radiance. */
+void weft_preview_add_light(const weft_preview_setup *setup, const weft_preview_light *light,
+                            weft_preview_samples *s);
+
+/** The model's f for the directions of the samples, with light and view in their local frames. */
+void weft_preview_eval(const weft_preview_setup *setup, weft_preview_samples *s,
+                       double value[3][WEFT_PREVIEW_RUN]);
+
+/** Turns lamp into the local frames. */
+void weft_preview_turn_lamp(weft_preview_samples *s);
+
+/** Adds the surroundings' light to radiance. */
+void weft_preview_add_surroundings(const weft_preview_setup *setup, weft_preview_samples *s);
 
 /** Fills normal and param from u and v; takes masked places off hit. */
 void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s);

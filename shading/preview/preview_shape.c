@@ -4,7 +4,10 @@
 #include "shading/brdf/half_vector.h"
 
 #define SPHERE_SHARE      0.92 /* of the shorter side that the sphere's outline takes */
+#define ROLL_SHARE        0.7  /* the same of a roll */
 #define MAX_SUPERSAMPLING 16
+#define FOLDS             2.5  /* of the drape, over its width */
+#define FOLD_DEPTH        0.14 /* amplitude at the lower edge, of half the width; a third of it at the top */
 
 static int even_at_least(double samples)
 {
@@ -12,6 +15,20 @@ static int even_at_least(double samples)
     while (n < samples && n < MAX_SUPERSAMPLING)
         n += 2;
     return n;
+}
+
+/* Roll and drape: a repeat is as wide as the roll's half round, or as the drape is high. */
+static void setup_upright(weft_preview_setup *setup, double side)
+{
+    const weft_preview_view *const view = setup->view;
+    const weft_preview_crop crop = setup->crop;
+    const double shorter = crop.width < crop.height ? crop.width : crop.height;
+    const bool roll = view->shape == WEFT_PREVIEW_CYLINDER;
+    setup->radius_px = (roll ? ROLL_SHARE : SPHERE_SHARE) * side / 2;
+    setup->radius_texels = roll ? view->repeat * shorter / WEFT_PI : view->repeat * shorter / 2;
+    setup->texels_per_px = setup->radius_texels / setup->radius_px;
+    setup->eye_distance = 0;
+    setup->supersampling = even_at_least(1.5 * setup->texels_per_px);
 }
 
 void weft_preview_setup_shape(weft_preview_setup *setup)
@@ -24,6 +41,10 @@ void weft_preview_setup_shape(weft_preview_setup *setup)
         setup->texels_per_px = weft_max((double)crop.width / view->width, (double)crop.height / view->height);
         setup->eye_distance = view->fov_deg > 0 ? side / 2 / tan(half_fov) : 0;
         setup->supersampling = even_at_least(setup->texels_per_px);
+        return;
+    }
+    if (view->shape != WEFT_PREVIEW_SPHERE) {
+        setup_upright(setup, side);
         return;
     }
     const double shorter = crop.width < crop.height ? crop.width : crop.height;
@@ -122,10 +143,114 @@ static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
     }
 }
 
+static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    const double radius = setup->radius_texels;
+    for (int i = 0; i < s->n; i++) {
+        const double x = s->x[i] / setup->radius_px, y = s->y[i] / setup->radius_px;
+        const bool on = fabs(x) < 1 && fabs(y) <= SPHERE_SHARE / ROLL_SHARE;
+        const double nx = on ? x : 0, nz = sqrt(1 - nx * nx);
+        s->hit[i] = on;
+        s->u[i] = setup->crop.width / 2.0 - 0.5 + radius * asin(nx);
+        s->v[i] = setup->crop.height / 2.0 - 0.5 - radius * y;
+        const double axes[3][3] = {{nz, 0, -nx}, {0, 1, 0}, {nx, 0, nz}}, at[3] = {nx, y, nz};
+        for (int a = 0; a < 3; a++) {
+            s->position_mm[a][i] = at[a] * radius * setup->surface->mm_per_px;
+            for (int c = 0; c < 3; c++)
+                s->axis[a][c][i] = axes[a][c];
+        }
+        set_eye(s, i, 0, 0, 1);
+    }
+}
+
+/* Height of the drape and its slopes; lengths in half widths. */
+static double drape_height(double x, double y, double slope[2])
+{
+    const double k = WEFT_PI * FOLDS, deep = FOLD_DEPTH * (2 - y) / 3; /* y 1 above: 1/3, y -1: 1 */
+    const double bend = 0.35 * (y + 1);                                /* folds lean a little */
+    const double phase = k * x + bend;
+    slope[0] = -deep * k * sin(phase);
+    slope[1] = -FOLD_DEPTH / 3 * cos(phase) - 0.35 * deep * sin(phase);
+    return deep * cos(phase);
+}
+
+/* Length of the cloth from the middle to x, by Simpson's rule over short steps. */
+static double drape_length(double x, double y)
+{
+    enum { STEPS = 16 };
+    double sum = 0, slope[2];
+    for (int i = 0; i <= STEPS; i++) {
+        drape_height(x * i / STEPS, y, slope);
+        sum += (i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2) * sqrt(1 + slope[0] * slope[0]);
+    }
+    return x * sum / (3 * STEPS);
+}
+
+static void set_drape_axes(weft_preview_samples *s, int i, const double slope[2])
+{
+    const double along = 1 / sqrt(1 + slope[0] * slope[0]);
+    const double t[3] = {along, 0, slope[0] * along};
+    const double up = 1 / sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+    const double n[3] = {-slope[0] * up, -slope[1] * up, up};
+    const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+    for (int c = 0; c < 3; c++) {
+        s->axis[0][c][i] = t[c];
+        s->axis[1][c][i] = b[c];
+        s->axis[2][c][i] = n[c];
+    }
+}
+
+static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    const double half = setup->radius_texels, scale = half * setup->surface->mm_per_px;
+    for (int i = 0; i < s->n; i++) {
+        double slope[2];
+        const double x = s->x[i] / setup->radius_px, y = s->y[i] / setup->radius_px;
+        const double z = drape_height(x, y, slope);
+        s->hit[i] = fabs(x) <= 1 && fabs(y) <= 1;
+        s->u[i] = setup->crop.width / 2.0 - 0.5 + half * drape_length(x, y);
+        s->v[i] = setup->crop.height / 2.0 - 0.5 - half * y;
+        s->position_mm[0][i] = x * scale;
+        s->position_mm[1][i] = y * scale;
+        s->position_mm[2][i] = z * scale;
+        set_drape_axes(s, i, slope);
+        set_eye(s, i, 0, 0, 1);
+    }
+}
+
+/* Marches towards the light until the ray is above all folds. */
+double weft_preview_drape_light(const weft_preview_setup *setup, const double position_px[3],
+                                const double lamp[3])
+{
+    enum { STEPS = 48 };
+    const double x = position_px[0] / setup->radius_px, y = position_px[1] / setup->radius_px;
+    double slope[2];
+    const double z = drape_height(x, y, slope), across = sqrt(lamp[0] * lamp[0] + lamp[1] * lamp[1]);
+    const double reach = lamp[2] > 0 ? (FOLD_DEPTH - z) / lamp[2] : 2 / weft_max(across, 1e-6);
+    for (int k = 1; k <= STEPS; k++) {
+        const double t = 0.01 + reach * k / STEPS, px = x + t * lamp[0], py = y + t * lamp[1];
+        if (fabs(px) > 1 || fabs(py) > 1)
+            break;
+        if (z + t * lamp[2] < drape_height(px, py, slope) - 1e-3)
+            return 0;
+    }
+    return 1;
+}
+
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s)
 {
-    if (setup->view->shape == WEFT_PREVIEW_PLANE)
+    switch (setup->view->shape) {
+    case WEFT_PREVIEW_PLANE:
         hit_plane(setup, s);
-    else
+        break;
+    case WEFT_PREVIEW_SPHERE:
         hit_sphere(setup, s);
+        break;
+    case WEFT_PREVIEW_CYLINDER:
+        hit_roll(setup, s);
+        break;
+    case WEFT_PREVIEW_DRAPE:
+        hit_drape(setup, s);
+        break;
+    }
 }

@@ -74,6 +74,26 @@ assert pixel(12 + 15, top) == (0, 0, 0), pixel(12 + 15, top)
 assert pixel(12 + 32 + 5, top) == (188, 188, 188), pixel(12 + 32 + 5, top)
 EOF
 
+# lamps, surroundings, shapes, grids and sweeps; no INPUT is a smooth surface
+export XDG_CACHE_HOME="$PWD/cache"
+expect 0 'sky.png: 48 x 48' "$weft" preview -o sky.png --brdf ggx --shape sphere --sky 225,40 --lamp 225,40 --tone agx --size 48x48
+test -f cache/weft/*.table
+expect 0 'pano.png' "$weft" preview weave.maps -o pano.png --env sky.png --lamp none --brdf cloth --shape drape --size 40x40
+expect 0 'roll.png' "$weft" preview weave.maps -o roll.png --shape cylinder --lamp ball:-40,40,60,9,2 --area representative --size 40x40
+expect 0 'grid.png: 348 x' "$weft" preview -o grid.png --brdf ggx,cloth --columns alpha=0.1,0.3,0.9 --shape sphere --size 100x60
+expect 0 'lamps.png: 196 x' "$weft" preview -o lamps.png --columns lamps --lamp 0,30 --lamp tube:-9,0,9,9,0,9 --shape sphere --size 80x80
+expect 0 '' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30
+is_png turn-002.png 40 30
+! cmp -s turn-000.png turn-001.png
+expect 1 'turn-000.png' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30
+expect 2 'no lamp is written' "$weft" preview -o x.png --lamp ball:1,2
+expect 2 'radius above 0' "$weft" preview -o x.png --lamp ball:0,0,10,12
+expect 2 'EL from 0 to 90' "$weft" preview -o x.png --sky 10,-5
+expect 2 'two ways' "$weft" preview -o x.png --sky 10,5 --env sky.png
+expect 2 '"lamps" with some' "$weft" preview -o x.png --columns lamps
+expect 1 'no/such.exr' "$weft" preview -o x.png --env no/such.exr
+expect 2 'wants the INPUT' "$weft" preview -o x.png --match small.set -c x.cal
+
 # light from the left brightens the left flanks: the picture under 180,30 and under 0,30 must differ, and the
 # same command must give the same bytes
 "$weft" preview -q weave.maps -o a.png --light 180,30 >/dev/null

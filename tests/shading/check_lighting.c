@@ -1,16 +1,21 @@
 /* Lights, sky, environment and occlusion against figures and integrals from elsewhere. */
+#define _POSIX_C_SOURCE 200809L /* mkdtemp, setenv */
 #include "tests/support/support.h"
 
+#include "core/file.h"
 #include "shading/brdf/albedo.h"
 #include "shading/brdf/half_vector.h"
 #include "shading/brdf/sampling.h"
 #include "shading/lighting/ambient_occlusion.h"
 #include "shading/lighting/area_light.h"
 #include "shading/lighting/environment.h"
+#include "shading/lighting/environment_map.h"
+#include "shading/lighting/environment_table.h"
 #include "shading/lighting/sky.h"
 #include "shading/lighting/volume_light.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #define SEED 20261124u
 
@@ -237,6 +242,81 @@ static void test_prefilter(void **state)
     }
 }
 
+/* A panorama with radiance 1 + 0.5 n.a + 0.25 P2(n.b): filtering must multiply the bands by the kernel's
+ * moments, and the irradiance is known. */
+static void test_panorama(void **state)
+{
+    (void)state;
+    const double a[3] = {0.6, 0, 0.8}, b[3] = {0, 0.8, -0.6};
+    weft_image panorama;
+    weft_environment_map map;
+    assert_ok(weft_image_init(&panorama, 256, 128, 1, err));
+    for (int y = 0; y < 128; y++)
+        for (int x = 0; x < 256; x++) {
+            const double azimuth = WEFT_PI * (2 * (x + 0.5) / 256 - 1), zenith = WEFT_PI * (y + 0.5) / 128;
+            const double d[3] = {sin(zenith) * sin(azimuth), sin(zenith) * cos(azimuth), cos(zenith)};
+            weft_image_row(&panorama, 0, y)[x] =
+                (float)(1 + 0.5 * dot(d, a) + 0.125 * (3 * dot(d, b) * dot(d, b) - 1));
+        }
+    assert_ok(weft_environment_map_init(&map, &panorama, err));
+    uint64_t random = SEED;
+    for (int i = 0; i < 200; i++) {
+        double n[3], e[3], radiance[3], moments[2];
+        weft_brdf_direction(between(&random, -1, 1), between(&random, 0, 7), n);
+        const double p1 = 0.5 * dot(n, a), p2 = 0.125 * (3 * dot(n, b) * dot(n, b) - 1);
+        weft_environment_map_irradiance(&map, n, e);
+        assert_near(e[2], WEFT_PI * (1 + p1 * 2 / 3 + p2 / 4), 2e-3);
+        const double roughness = (i % WEFT_ENVIRONMENT_LEVELS) / (WEFT_ENVIRONMENT_LEVELS - 1.0);
+        weft_environment_prefilter(roughness, 2, moments);
+        weft_environment_map_look(&map, n, roughness, radiance);
+        assert_near(radiance[0], 1 + moments[0] * p1 + moments[1] * p2, 8e-3);
+    }
+    weft_environment_map_fini(&map);
+    weft_image_fini(&panorama);
+}
+
+/* The painted sky against the projection by quadrature, and the card that reads 1. */
+static void test_painted_sky(void **state)
+{
+    (void)state;
+    const double zenith = 0.8, azimuth = 2.1, up[3] = {0, 0, 1};
+    double wanted[WEFT_SH_COUNT], e[3];
+    weft_image panorama;
+    weft_environment_map map;
+    assert_ok(weft_environment_paint_sky(&panorama, &weft_sky_cie_clear, zenith, azimuth, err));
+    assert_ok(weft_environment_map_init(&map, &panorama, err));
+    weft_sky_project(&weft_sky_cie_clear, zenith, azimuth, wanted);
+    for (int k = 1; k < WEFT_SH_COUNT; k++)
+        assert_near(map.light[0][k] / map.light[0][0], wanted[k] / wanted[0], 2e-3);
+    weft_environment_map_irradiance(&map, up, e);
+    assert_near(e[1], WEFT_PI, 0.02 * WEFT_PI); /* three bands of it */
+    weft_environment_map_fini(&map);
+    weft_image_fini(&panorama);
+}
+
+static void test_environment_table(void **state)
+{
+    (void)state;
+    static weft_environment_table table;
+    char folder[] = "cache-XXXXXX";
+    uint64_t random = SEED;
+    assert_non_null(mkdtemp(folder));
+    assert_int_equal(setenv("XDG_CACHE_HOME", folder, 1), 0);
+    weft_environment_table_get(&table, WEFT_ENVIRONMENT_SMITH);
+    for (int i = 0; i < 150; i++) {
+        const double r = between(&random, 0.15, 1), c = between(&random, 0.1, 1);
+        const double alpha = r * r * r, nv = c * c * c;
+        const weft_environment_share wanted = weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, alpha, nv, 0);
+        const weft_environment_share got = weft_environment_table_at(&table, nv, alpha);
+        assert_near(got.scale, wanted.scale, 5e-4);
+        assert_near(got.bias, wanted.bias, 5e-4);
+    }
+    static weft_environment_table again;
+    weft_environment_table_get(&again, WEFT_ENVIRONMENT_SMITH); /* from the cache */
+    assert_memory_equal(&again, &table, sizeof table);
+    assert_ok(weft_folder_remove(folder, err));
+}
+
 static void test_occlusion(void **state)
 {
     (void)state;
@@ -282,6 +362,9 @@ int main(void)
         cmocka_unit_test(test_tube_against_sums_along_it),
         cmocka_unit_test(test_environment),
         cmocka_unit_test(test_prefilter),
+        cmocka_unit_test(test_panorama),
+        cmocka_unit_test(test_painted_sky),
+        cmocka_unit_test(test_environment_table),
         cmocka_unit_test(test_occlusion),
         cmocka_unit_test(test_phase_function_integrates_to_one),
     };

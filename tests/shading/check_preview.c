@@ -2,8 +2,10 @@
 #include "tests/support/support.h"
 
 #include "core/parallel.h"
+#include "shading/brdf/albedo.h"
 #include "shading/brdf/half_vector.h"
 #include "shading/preview/preview.h"
+#include "shading/preview/tone.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +35,7 @@ static weft_preview_view view_of(int width, int height, double azimuth_deg, doub
     weft_preview_view view = weft_preview_view_defaults();
     view.width = width;
     view.height = height;
-    weft_preview_direction(azimuth_deg, elevation_deg, view.light.direction);
+    weft_preview_direction(azimuth_deg, elevation_deg, view.lights[0].direction);
     return view;
 }
 
@@ -50,7 +52,7 @@ static void test_flat_plane(void **state)
     weft_preview_view view = view_of(40, 30, 70, 30);
     weft_image albedo = constant_image(40, 30, 0.8, 0.4, 0.1), picture;
     const double irradiance[3] = {3, 2, 1}, albedos[3] = {0.8, 0.4, 0.1};
-    memcpy(view.light.irradiance, irradiance, sizeof irradiance);
+    memcpy(view.lights[0].irradiance, irradiance, sizeof irradiance);
     view.exposure_ev = 1;
     view.ambient = 0.25;
     assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
@@ -75,8 +77,8 @@ static void test_point_light(void **state)
     surface.mm_per_px = 0.5;
     surface.origin_mm[0] = -20; /* the middle is at (4.75, 5.25) */
     surface.origin_mm[1] = 30;
-    view.light.is_point = true;
-    memcpy(view.light.position_mm, p, sizeof p);
+    view.lights[0].kind = WEFT_PREVIEW_POINT;
+    memcpy(view.lights[0].position_mm, p, sizeof p);
     assert_ok(weft_preview_render(&surface, &view, &picture, err));
     for (int y = 5; y < 100; y += 30)
         for (int x = 5; x < 100; x += 30) {
@@ -171,7 +173,7 @@ static void test_sphere_mirrors_normals(void **state)
     weft_preview_surface surface = surface_of("lambert", 64, 64);
     weft_preview_view view = view_of(SIZE, SIZE, 20, 60);
     weft_image normal = constant_image(64, 64, 0.28, 0, 0.96), picture;
-    const double *const l = view.light.direction;
+    const double *const l = view.lights[0].direction;
     view.shape = WEFT_PREVIEW_SPHERE;
     view.repeat = 4; /* a tile is an arc of 45 degrees: the first edge is at 22.5 degrees */
     surface.normal = &normal;
@@ -298,15 +300,158 @@ static void test_refusals(void **state)
     surface.normal = &small;
     assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_MISMATCH, "normal map");
     surface.normal = NULL;
-    view.light.is_point = true;
+    view.lights[0].kind = WEFT_PREVIEW_POINT;
     assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_MISSING, "no");
-    view.light.is_point = false;
+    view.lights[0].kind = WEFT_PREVIEW_DISTANT;
     view.repeat = 0;
     assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_RANGE, "repeat");
     view.repeat = 1;
     view.width = 0;
     assert_fails(weft_preview_render(&surface, &view, &picture, err), WEFT_ERR_RANGE, "0 x 10");
     weft_image_fini(&small);
+}
+
+/* A ball gives a facing card what a point in its middle gives, a small one everywhere; the tube's mean. */
+static void test_area_lights(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 60, 60);
+    weft_preview_view view = view_of(30, 30, 0, 90);
+    weft_image point, ball, small, tube;
+    surface.mm_per_px = 0.1;
+    surface.origin_mm[0] = -2.95;
+    surface.origin_mm[1] = 2.95;
+    const double middle[3] = {10, -5, 40};
+    view.lights[0].kind = WEFT_PREVIEW_POINT;
+    memcpy(view.lights[0].position_mm, middle, sizeof middle);
+    assert_ok(weft_preview_render(&surface, &view, &point, err));
+    view.lights[0].kind = WEFT_PREVIEW_BALL;
+    view.lights[0].radius_mm = 15;
+    assert_ok(weft_preview_render(&surface, &view, &ball, err));
+    view.lights[0].radius_mm = 0.01;
+    assert_ok(weft_preview_render(&surface, &view, &small, err));
+    view.lights[0].kind = WEFT_PREVIEW_TUBE;
+    memcpy(view.lights[0].end_mm, middle, sizeof middle);
+    view.lights[0].position_mm[0] -= 0.02;
+    view.lights[0].end_mm[0] += 0.02;
+    assert_ok(weft_preview_render(&surface, &view, &tube, err));
+    for (int y = 1; y < 29; y++)
+        for (int x = 1; x < 29; x++) {
+            /* a whole sphere above the horizon lights a plane as its middle would, whatever its size */
+            assert_near(pixel(&ball, 0, x, y), pixel(&point, 0, x, y), 0.01);
+            assert_near(pixel(&small, 1, x, y), pixel(&point, 1, x, y), 1e-4);
+            assert_near(pixel(&tube, 2, x, y), pixel(&point, 2, x, y), 1e-4);
+        }
+    weft_image_fini(&point);
+    weft_image_fini(&ball);
+    weft_image_fini(&small);
+    weft_image_fini(&tube);
+}
+
+/* Both ways to sum a small ball agree: Unreal's point is then the middle. */
+static void test_representative_point(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("ggx", 40, 40);
+    weft_preview_view view = view_of(20, 20, 0, 90);
+    weft_image points, representative;
+    surface.mm_per_px = 1;
+    view.lights[0].kind = WEFT_PREVIEW_BALL;
+    view.lights[0].position_mm[2] = 60;
+    view.lights[0].position_mm[0] = 20;
+    view.lights[0].radius_mm = 0.05;
+    view.fov_deg = 40;
+    assert_ok(weft_preview_render(&surface, &view, &points, err));
+    view.lights[0].area = WEFT_PREVIEW_REPRESENTATIVE;
+    assert_ok(weft_preview_render(&surface, &view, &representative, err));
+    for (int i = 0; i < 400; i++)
+        assert_near((double)representative.data[i], (double)points.data[i], 0.02 * (double)points.data[i]);
+    weft_image_fini(&points);
+    weft_image_fini(&representative);
+}
+
+/* In an even white room everything shows its own directional albedo. */
+static void test_even_surroundings(void **state)
+{
+    (void)state;
+    static weft_environment_table table;
+    static const char *const models[] = {"lambert", "ggx-specular", "cloth", "charlie"};
+    weft_image white, picture;
+    weft_environment_map map;
+    /* seen straight on at one width only: the table's other places do not count */
+    const weft_environment_share share = weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, 0.3, 1, 0);
+    for (int i = 0; i < WEFT_ENVIRONMENT_TABLE_SIZE * WEFT_ENVIRONMENT_TABLE_SIZE; i++) {
+        (&table.share[0][0][0])[i] = (float)share.scale;
+        (&table.share[1][0][0])[i] = (float)share.bias;
+    }
+    assert_ok(weft_image_init(&white, 32, 16, 1, err));
+    for (int i = 0; i < 512; i++)
+        white.data[i] = 1;
+    assert_ok(weft_environment_map_init(&map, &white, err));
+    for (int m = 0; m < 4; m++) {
+        weft_preview_surface surface = surface_of(models[m], 8, 8);
+        weft_preview_view view = view_of(8, 8, 0, 90);
+        double albedo[3];
+        view.n_lights = 0;
+        view.surroundings = (weft_preview_surroundings){&map, &table, 2};
+        assert_ok(weft_preview_render(&surface, &view, &picture, err)); /* seen straight on */
+        weft_brdf_albedo(surface.brdf, surface.params, 1, 0, WEFT_ALBEDO_QUICK, albedo);
+        assert_near(pixel(&picture, 0, 4, 4), 2 * albedo[0], 0.02);
+        weft_image_fini(&picture);
+    }
+    weft_environment_map_fini(&map);
+    weft_image_fini(&white);
+}
+
+/* The roll and the drape face the viewer where they are flat: n.l from there. */
+static void test_roll_and_drape(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 64, 64);
+    weft_preview_view view = view_of(200, 200, 0, 0);
+    weft_image picture;
+    view.shape = WEFT_PREVIEW_CYLINDER;
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int x = 100; x < 200; x++) {
+        const double px = (x - 99.5) / 70;
+        if (px > 1.03)
+            assert_near(pixel(&picture, 0, x, 100), 0.18, 1e-6);
+        if (px > 0.02 && px < 0.96)
+            assert_near(pixel(&picture, 0, x, 100), 0.5 * px, 2e-3);
+    }
+    weft_image_fini(&picture);
+    view = view_of(200, 200, 0, 30);
+    view.shape = WEFT_PREVIEW_DRAPE;
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    double darkest = 1, brightest = 0;
+    for (int x = 20; x < 180; x++) {
+        darkest = fmin(darkest, pixel(&picture, 0, x, 180));
+        brightest = fmax(brightest, pixel(&picture, 0, x, 180));
+    }
+    assert_near(darkest, 0, 1e-6); /* behind the folds */
+    assert_true(brightest > 0.45 && brightest < 0.501);
+    assert_near(pixel(&picture, 0, 3, 3), 0.18, 1e-6);
+    weft_image_fini(&picture);
+}
+
+static void test_tone_curves(void **state)
+{
+    (void)state;
+    double grey[3] = {0.18, 0.18, 0.18}, bright[3] = {1e5, 1e5, 1e5}, odd[3] = {-1, NAN, 0};
+    weft_tone_apply(WEFT_TONE_AGX, grey); /* the pivot of its curve */
+    assert_near(pow(grey[0], 1 / 2.2), 0.5, 0.01);
+    assert_near(grey[0], grey[2], 1e-3);
+    weft_tone_apply(WEFT_TONE_AGX, bright);
+    assert_true(bright[0] > 0.95 && bright[0] <= 1);
+    weft_tone_apply(WEFT_TONE_ACES, odd);
+    assert_near(odd[0] + odd[1] + odd[2], 0, 1e-9);
+    for (int tone = WEFT_TONE_ACES; tone <= WEFT_TONE_AGX; tone++)
+        for (double x = 0.001, last = 0; x < 1000; x *= 1.1) {
+            double rgb[3] = {x, x, x};
+            weft_tone_apply((weft_tone)tone, rgb);
+            assert_true(rgb[1] >= last && rgb[1] <= 1);
+            last = rgb[1];
+        }
 }
 
 int main(void)
@@ -322,6 +467,11 @@ int main(void)
         cmocka_unit_test(test_mask_shows_the_background),
         cmocka_unit_test(test_fine_weaves_do_not_beat),
         cmocka_unit_test(test_threads_do_not_change_it),
+        cmocka_unit_test(test_area_lights),
+        cmocka_unit_test(test_representative_point),
+        cmocka_unit_test(test_even_surroundings),
+        cmocka_unit_test(test_roll_and_drape),
+        cmocka_unit_test(test_tone_curves),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,27 @@
+/** The lights of "weft preview" as the user writes them. */
+#ifndef WEFT_HOST_CLI_PREVIEW_LIGHTS_H
+#define WEFT_HOST_CLI_PREVIEW_LIGHTS_H
+
+#include "core/fields.h"
+#include "shading/preview/preview.h"
+
+/**
+ * Reads one lamp: "AZ,EL", "mm:X,Y,Z", "ball:X,Y,Z,RADIUS" or "tube:X,Y,Z,X,Y,Z" (mm), each optionally with
+ * ",STRENGTH" behind (1: a white card at the origin that faces it reads 1).
+ * @return WEFT_ERR_USAGE saying what was wanted
+ */
+weft_err weft_preview_lamp(const char *text, weft_preview_light *light, weft_error *err);
+
+/** A panorama and the table that go with it, in memory. */
+typedef struct weft_preview_around {
+    weft_environment_map map;
+    weft_environment_table table;
+} weft_preview_around;
+
+/** Reads a panorama (EXR, or PNG/TIFF in sRGB), or paints the sky with the sun at {azimuth, elevation} in
+ *  degrees, and makes surroundings of it.  One of `file` and `sky_deg` is given. */
+weft_err weft_preview_around_init(weft_preview_around *around, const char *file, const weft_numbers *sky_deg,
+                                  const weft_sky *sky, weft_error *err);
+void weft_preview_around_fini(weft_preview_around *around);
+
+#endif

@@ -1,0 +1,253 @@
+#include "shading/lighting/environment_map.h"
+
+#include "core/parallel.h"
+#include "shading/brdf/sampling.h"
+
+#include <string.h>
+
+enum { SHARPEST = 1024, FILTERED = 128, N_POINTS = 256, MAX_MIPS = 12 };
+
+/* The panorama and its halves. */
+typedef struct pyramid {
+    int n;
+    weft_image mips[MAX_MIPS];
+} pyramid;
+
+static void direction_of(const weft_image *image, int column, int row, double d[3])
+{
+    const double azimuth = WEFT_PI * (2 * (column + 0.5) / image->width - 1); /* from +y towards +x */
+    const double zenith = WEFT_PI * (row + 0.5) / image->height;
+    d[0] = sin(zenith) * sin(azimuth);
+    d[1] = sin(zenith) * cos(azimuth);
+    d[2] = cos(zenith);
+}
+
+static double solid_angle(const weft_image *image, int row)
+{
+    const double top = cos(WEFT_PI * row / image->height), bottom = cos(WEFT_PI * (row + 1) / image->height);
+    return 2 * WEFT_PI / image->width * (top - bottom);
+}
+
+/* Bilinear; wraps across, stops at the poles. */
+static void look_at(const weft_image *image, const double d[3], double weight, double sum[3])
+{
+    const double u = (atan2(d[0], d[1]) / (2 * WEFT_PI) + 0.5) * image->width - 0.5;
+    const double v = acos(d[2] > 1 ? 1 : d[2] < -1 ? -1 : d[2]) / WEFT_PI * image->height - 0.5;
+    const double fu = floor(u), fv = floor(v), tu = u - fu, tv = v - fv;
+    const int x0 = ((int)fu + image->width) % image->width, x1 = (x0 + 1) % image->width;
+    const int last = image->height - 1;
+    const int y0 = fv < 0 ? 0 : (int)fv, y1 = fv + 1 > last ? last : (int)fv + 1;
+    for (int c = 0; c < 3; c++) {
+        const float *const a = weft_image_row(image, c, y0 > last ? last : y0);
+        const float *const b = weft_image_row(image, c, y1);
+        sum[c] += weight * ((1 - tv) * ((1 - tu) * (double)a[x0] + tu * (double)a[x1]) +
+                            tv * ((1 - tu) * (double)b[x0] + tu * (double)b[x1]));
+    }
+}
+
+/* Scales by area on the sphere to 3 clean planes. */
+static weft_err shrink(const weft_image *from, int width, int height, weft_image *to, weft_error *err)
+{
+    WEFT_TRY(weft_image_init(to, width, height, 3, err));
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            const int y0 = y * from->height / height, y1 = (y + 1) * from->height / height;
+            const int x0 = x * from->width / width, x1 = (x + 1) * from->width / width;
+            double sum[3] = {0}, area = 0;
+            for (int j = y0; j < y1 || j == y0; j++)
+                for (int i = x0; i < x1 || i == x0; i++) {
+                    const double w = solid_angle(from, j);
+                    area += w;
+                    for (int c = 0; c < 3; c++) {
+                        const double v = (double)weft_image_row(from, from->planes == 3 ? c : 0, j)[i];
+                        sum[c] += v > 0 && isfinite(v) ? w * v : 0;
+                    }
+                }
+            for (int c = 0; c < 3; c++)
+                weft_image_row(to, c, y)[x] = (float)(sum[c] / area);
+        }
+    return WEFT_OK;
+}
+
+static void pyramid_fini(pyramid *p)
+{
+    for (int i = 0; i < p->n; i++)
+        weft_image_fini(&p->mips[i]);
+    *p = (pyramid){0};
+}
+
+static weft_err pyramid_init(pyramid *p, const weft_image *panorama, weft_error *err)
+{
+    int width = panorama->width < SHARPEST ? panorama->width : SHARPEST;
+    int height = panorama->height < SHARPEST / 2 ? panorama->height : SHARPEST / 2;
+    weft_err status = shrink(panorama, width, height, &p->mips[0], err);
+    for (p->n = status == WEFT_OK; status == WEFT_OK && width >= 8 && height >= 4 && p->n < MAX_MIPS;) {
+        width /= 2;
+        height /= 2;
+        status = shrink(&p->mips[p->n - 1], width, height, &p->mips[p->n], err);
+        p->n += status == WEFT_OK;
+    }
+    return status;
+}
+
+static void project(const weft_image *image, double light[3][WEFT_SH_COUNT])
+{
+    memset(light, 0, 3 * sizeof light[0]);
+    for (int y = 0; y < image->height; y++)
+        for (int x = 0; x < image->width; x++) {
+            double d[3], basis[WEFT_SH_COUNT];
+            direction_of(image, x, y, d);
+            weft_sh_basis(d[0], d[1], d[2], basis);
+            for (int c = 0; c < 3; c++)
+                for (int k = 0; k < WEFT_SH_COUNT; k++)
+                    light[c][k] += solid_angle(image, y) * (double)weft_image_row(image, c, y)[x] * basis[k];
+        }
+}
+
+/* The points of a level's kernel about +z: mirrored direction, weight, mip of the panorama. */
+typedef struct kernel {
+    int n;
+    double l[N_POINTS][3], weight[N_POINTS], lod[N_POINTS];
+} kernel;
+
+static void kernel_init(kernel *k, double alpha, const weft_image *sharpest)
+{
+    double total = 0;
+    k->n = 0;
+    for (uint32_t i = 0; i < N_POINTS; i++) {
+        double u[2];
+        weft_hammersley(i, N_POINTS, u);
+        const double nh = weft_sample_ggx_cosine(alpha, u[1]), nl = 2 * nh * nh - 1;
+        const double sine = 2 * nh * sqrt(weft_max(1 - nh * nh, 0)), phi = 2 * WEFT_PI * u[0];
+        if (nl <= 0)
+            continue;
+        double *const l = k->l[k->n];
+        l[0] = sine * cos(phi);
+        l[1] = sine * sin(phi);
+        l[2] = nl;
+        const double share = 4 / (N_POINTS * weft_ggx_d(nh, 1 - nh * nh, alpha)); /* of the sphere, sr */
+        const double texel = 4 * WEFT_PI / ((double)sharpest->width * sharpest->height);
+        k->lod[k->n] = weft_max(0.5 * log2(share / texel), 0);
+        k->weight[k->n++] = nl;
+        total += nl;
+    }
+    for (int i = 0; i < k->n; i++)
+        k->weight[i] /= total;
+}
+
+typedef struct filter_job {
+    const pyramid *from;
+    const kernel *kernel;
+    weft_image *to;
+} filter_job;
+
+static void filter_texel(const filter_job *job, const double n[3], double sum[3])
+{
+    const double side = fabs(n[2]) < 0.999 ? 0 : 1; /* up is z, or x near the poles */
+    double t[3] = {(1 - side) * -n[1], (1 - side) * n[0] - side * n[2], side * n[1]};
+    const double inverse = 1 / sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+    for (int c = 0; c < 3; c++)
+        t[c] *= inverse;
+    const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+    for (int i = 0; i < job->kernel->n; i++) {
+        const double *const l = job->kernel->l[i];
+        const double lod = fmin(job->kernel->lod[i], job->from->n - 1), low = floor(lod), part = lod - low;
+        double d[3];
+        for (int c = 0; c < 3; c++)
+            d[c] = l[0] * t[c] + l[1] * b[c] + l[2] * n[c];
+        look_at(&job->from->mips[(int)low], d, job->kernel->weight[i] * (1 - part), sum);
+        if (part > 0)
+            look_at(&job->from->mips[(int)low + 1], d, job->kernel->weight[i] * part, sum);
+    }
+}
+
+static void filter_rows(void *context, int band, int row_begin, int row_end)
+{
+    const filter_job *const job = context;
+    (void)band;
+    for (int y = row_begin; y < row_end; y++)
+        for (int x = 0; x < job->to->width; x++) {
+            double n[3], sum[3] = {0};
+            direction_of(job->to, x, y, n);
+            filter_texel(job, n, sum);
+            for (int c = 0; c < 3; c++)
+                weft_image_row(job->to, c, y)[x] = (float)sum[c];
+        }
+}
+
+static weft_err make_levels(weft_environment_map *map, const pyramid *from, weft_error *err)
+{
+    kernel k;
+    WEFT_TRY(weft_image_copy(&map->levels[0], &from->mips[0], err));
+    for (int level = 1; level < WEFT_ENVIRONMENT_LEVELS; level++) {
+        const double roughness = level / (WEFT_ENVIRONMENT_LEVELS - 1.0);
+        const int width = level == 1 ? 2 * FILTERED : FILTERED;
+        WEFT_TRY(weft_image_init(&map->levels[level], width, width / 2, 3, err));
+        kernel_init(&k, roughness * roughness, &from->mips[0]);
+        weft_parallel_rows(width / 2, filter_rows, &(filter_job){from, &k, &map->levels[level]});
+    }
+    return WEFT_OK;
+}
+
+weft_err weft_environment_map_init(weft_environment_map *map, const weft_image *panorama, weft_error *err)
+{
+    weft_environment_map made = {0};
+    pyramid from = {0};
+    if (panorama->width < 8 || panorama->height < 4)
+        return weft_fail(err, WEFT_ERR_RANGE, "a panorama of %d x %d pixels is too small (8 x 4 at least)",
+                         panorama->width, panorama->height);
+    weft_err status = pyramid_init(&from, panorama, err);
+    if (status == WEFT_OK) {
+        project(&from.mips[0], made.light);
+        status = make_levels(&made, &from, err);
+    }
+    pyramid_fini(&from);
+    if (status != WEFT_OK)
+        weft_environment_map_fini(&made);
+    else
+        *map = made;
+    return status;
+}
+
+void weft_environment_map_fini(weft_environment_map *map)
+{
+    for (int level = 0; level < WEFT_ENVIRONMENT_LEVELS; level++)
+        weft_image_fini(&map->levels[level]);
+    *map = (weft_environment_map){0};
+}
+
+weft_err weft_environment_paint_sky(weft_image *panorama, const weft_sky *sky, double sun_zenith_rad,
+                                    double sun_azimuth_rad, weft_error *err)
+{
+    double card = 0;
+    WEFT_TRY(weft_image_init(panorama, 512, 256, 3, err));
+    for (int y = 0; y < panorama->height / 2; y++)
+        for (int x = 0; x < panorama->width; x++) {
+            double d[3];
+            direction_of(panorama, x, y, d);
+            const double value = weft_sky_relative_to_zenith(
+                sky, acos(d[2]), atan2(d[1], d[0]) - sun_azimuth_rad, sun_zenith_rad);
+            weft_image_row(panorama, 0, y)[x] = (float)value;
+            card += value * d[2] * solid_angle(panorama, y) / WEFT_PI;
+        }
+    for (size_t i = 0; i < weft_image_plane_size(panorama); i++)
+        for (int c = 2; c >= 0; c--)
+            weft_image_plane(panorama, c)[i] = (float)((double)weft_image_plane(panorama, 0)[i] / card);
+    return WEFT_OK;
+}
+
+void weft_environment_map_irradiance(const weft_environment_map *map, const double n[3], double e[3])
+{
+    for (int c = 0; c < 3; c++)
+        e[c] = weft_max(weft_sh_convolve(n, weft_sh_cosine, map->light[c]), 0);
+}
+
+void weft_environment_map_look(const weft_environment_map *map, const double direction[3], double roughness,
+                               double radiance[3])
+{
+    const double last = WEFT_ENVIRONMENT_LEVELS - 1, at = fmin(fmax(roughness, 0), 1) * last;
+    const int level = at < last ? (int)at : WEFT_ENVIRONMENT_LEVELS - 2;
+    radiance[0] = radiance[1] = radiance[2] = 0;
+    look_at(&map->levels[level], direction, 1 - (at - level), radiance);
+    look_at(&map->levels[level + 1], direction, at - level, radiance);
+}
