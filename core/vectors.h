@@ -3,7 +3,7 @@
  * out_*.
  *
  * build/bin/weft-vectors runs them against the tables.  Each library lists its own functions, e.g.
- * shading/vectors/vectors.h; this is what compares.
+ * shading/vectors/vectors_tables.h; this is what compares.
  */
 #ifndef WEFT_CORE_VECTORS_H
 #define WEFT_CORE_VECTORS_H

@@ -232,9 +232,10 @@ void weft_plot_circle(weft_plot *plot, int series, double x, double y, double ra
 {
     const double r = fabs(weft_plot_u(plot, x + radius) - weft_plot_u(plot, x));
     if (shown(plot, x, y) && isfinite(r))
-        weft_text_add(plot->out,
-                      "<circle class=\"l%d w\" clip-path=\"url(#c%d)\" cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\"/>\n",
-                      colour_of(series), plot->clip, weft_plot_u(plot, x), weft_plot_v(plot, y), r);
+        weft_text_add(
+            plot->out,
+            "<circle class=\"l%d w\" clip-path=\"url(#c%d)\" cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\"/>\n",
+            colour_of(series), plot->clip, weft_plot_u(plot, x), weft_plot_v(plot, y), r);
 }
 
 void weft_plot_box(weft_plot *plot, int series, const char *colour, double x0, double y0, double x1,

@@ -1,4 +1,5 @@
-/** What the camera sees, for the one who watches (core/report_channel.h): a small picture, histograms, clipping. */
+/** What the camera sees, for the one who watches (core/report_channel.h): a small picture, histograms,
+ * clipping. */
 #ifndef WEFT_HOST_CAPTURE_LIVE_PICTURE_H
 #define WEFT_HOST_CAPTURE_LIVE_PICTURE_H
 

@@ -4,7 +4,7 @@
 #include "core/csv.h"
 #include "core/mem.h"
 #include "shading/brdf/brdf.h"
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 #include <math.h>
 #include <string.h>

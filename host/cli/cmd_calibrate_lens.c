@@ -211,10 +211,10 @@ static weft_err fit_pose(lens_run *run, weft_error *err)
     double edge_px = 0;
     WEFT_TRY(find_board(run, path, view.corners, &found, &edge_px, err));
     if (!found)
-        return weft_fail(
-            err, WEFT_ERR_NODATA,
-            "%s: no board of %dx%d inner corners in it; all of the board must be seen, sharp and flat on the table",
-            path, run->board.columns, run->board.rows);
+        return weft_fail(err, WEFT_ERR_NODATA,
+                         "%s: no board of %dx%d inner corners in it; all of the board must be seen, sharp "
+                         "and flat on the table",
+                         path, run->board.columns, run->board.rows);
     WEFT_TRY(weft_calibration_require_size(&run->cal, run->width, run->height, run->args->output, err));
     return weft_lens_fit_pose(&run->board, &view, run->args->origin_mm.values, &run->cal.camera,
                               &run->pose_rms_px, err);

@@ -62,7 +62,8 @@ typedef struct weft_rig_options {
          .help = "bootloader of the light controller, so that weft flash can program it"},                   \
     {                                                                                                        \
         .key = "firmware", .type = WEFT_FIELD_TEXT, .offset = WEFT_RIG_OPTION(args_type, member, firmware),  \
-        .unit = "ELF", .help = "firmware of the light controller (default: that of this build; none: an empty chip)"           \
+        .unit = "ELF",                                                                                       \
+        .help = "firmware of the light controller (default: that of this build; none: an empty chip)"        \
     }
 
 #endif

@@ -131,8 +131,7 @@ weft_err weft_compare_calibrations(const weft_calibration *a, const weft_calibra
     if (d.has_camera)
         WEFT_TRY(compare_cameras(&a->camera, &b->camera, &d, err));
     for (int i = 0; i < 9 && d.has_colour; i++)
-        d.matrix_max =
-            fmax(d.matrix_max, fabs(a->colour.model.matrix.m[i] - b->colour.model.matrix.m[i]));
+        d.matrix_max = fmax(d.matrix_max, fabs(a->colour.model.matrix.m[i] - b->colour.model.matrix.m[i]));
     *difference = d;
     return WEFT_OK;
 }

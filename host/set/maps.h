@@ -15,17 +15,17 @@ typedef enum weft_geometry { WEFT_GEOMETRY_PLANE, WEFT_GEOMETRY_SENSOR } weft_ge
 typedef struct weft_maps {
     int width, height;
     weft_geometry geometry;
-    double mm_per_px;      /* plane only, else 0 */
-    double origin_mm[2];   /* plane only: world x, y of the centre of pixel (0, 0); +y is up, rows go down */
-    weft_image normal;     /* 3 planes X, Y, Z, unit; (0,0,0) where there is no answer */
-    weft_image albedo;     /* 3 planes linear; planes 0 when absent */
-    weft_image residual;   /* 1 plane; planes 0 when absent */
-    weft_image confidence; /* 1 plane 0..1; planes 0 when absent */
+    double mm_per_px;       /* plane only, else 0 */
+    double origin_mm[2];    /* plane only: world x, y of the centre of pixel (0, 0); +y is up, rows go down */
+    weft_image normal;      /* 3 planes X, Y, Z, unit; (0,0,0) where there is no answer */
+    weft_image albedo;      /* 3 planes linear; planes 0 when absent */
+    weft_image residual;    /* 1 plane; planes 0 when absent */
+    weft_image confidence;  /* 1 plane 0..1; planes 0 when absent */
     weft_image uncertainty; /* 1 plane: expected error of the normal, rms, degrees; planes 0 when absent */
     weft_mask lights;       /* lights that each answer rests on; data NULL when absent */
     weft_mask quality;      /* bits of docs/formats.md; data NULL when absent */
-    weft_mask mask;        /* 255 where there is an answer; data NULL: everywhere */
-    bool albedo_is_srgb;   /* linear sRGB (colour calibrated), else camera RGB */
+    weft_mask mask;         /* 255 where there is an answer; data NULL: everywhere */
+    bool albedo_is_srgb;    /* linear sRGB (colour calibrated), else camera RGB */
     json_t *info; /* inputs with hashes, options, version, timings: goes into maps.json; may be NULL */
 } weft_maps;
 

@@ -4,7 +4,7 @@
 #include "shading/bake/horizon.h"
 #include "shading/bake/normal_filter.h"
 #include "shading/bake/vmf.h"
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 static void gloss(int n, const double *const *in, double *const *out)
 {

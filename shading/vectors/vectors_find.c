@@ -1,4 +1,4 @@
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 #include <stddef.h>
 

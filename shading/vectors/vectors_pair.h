@@ -4,7 +4,7 @@
 
 #include "shading/brdf/brdf.h"
 #include "shading/brdf/half_vector.h"
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 #include <stdbool.h>
 

@@ -1,7 +1,7 @@
 /* Tables of pre-integrated skin and its light by spherical harmonics. */
 #include "shading/lighting/spherical_harmonics.h"
 #include "shading/skin/skin.h"
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 static const double pi = 3.14159265358979323846;
 

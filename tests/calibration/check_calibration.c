@@ -2,9 +2,9 @@
 #include "tests/support/support.h"
 
 #include "calibration/calibration.h"
-#include "core/json.h"
 #include "calibration/calibration_grid.h"
 #include "core/file.h"
+#include "core/json.h"
 #include "core/mem.h"
 
 #include <math.h>

@@ -58,7 +58,7 @@ headers_alone() {
     read -ra flags < <(pkg-config --cflags jansson OpenEXR aravis-0.8 libmicrohttpd)
     for header in $(git ls-files 'core/*.h' 'calibration/*.h' 'shading/*.h' 'host/*.h' 'firmware/protocol.h'); do
         echo "#include \"$header\"" |
-            gcc -std=c17 -D_GNU_SOURCE -Wall -Wextra -Werror -fsyntax-only -I. -Ibuild/generated \
+            gcc -std=c17 -D_GNU_SOURCE -fopenmp -Wall -Wextra -Werror -fsyntax-only -I. -Ibuild/generated \
                 "${flags[@]}" -x c - || bad=1
     done
     return $bad

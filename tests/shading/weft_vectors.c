@@ -2,7 +2,7 @@
 #include "calibration/charts/colour_vectors.h"
 #include "core/file.h"
 #include "core/text.h"
-#include "shading/vectors/vectors.h"
+#include "shading/vectors/vectors_tables.h"
 
 #include <dirent.h>
 #include <stdio.h>

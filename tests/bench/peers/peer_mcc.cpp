@@ -1,5 +1,6 @@
-// Finding the Macbeth chart: Weft's detector beside that of OpenCV's contributed module mcc, on the same drawn
-// pictures (turns of 15 degrees, tilts, dark, blurred, small, cluttered tables).  Only where mcc is installed.
+// Finding the Macbeth chart: Weft's detector beside that of OpenCV's contributed module mcc, on the same
+// drawn pictures (turns of 15 degrees, tilts, dark, blurred, small, cluttered tables).  Only where mcc is
+// installed.
 extern "C" {
 #include "calibration/charts/chart_find.h"
 #include "calibration/charts/homography.h"
@@ -15,7 +16,8 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 
-namespace {
+namespace
+{
 
 struct condition {
     const char *name;
@@ -61,7 +63,8 @@ cv::Mat shown(const weft_image &mosaic)
 }
 
 // Whether the first corner lies nearest to the first patch; the distance of the middle from the truth, px.
-bool place(const weft_chart *chart, const weft_mat3 &view, const double corner[2], const double middle[2], double *off)
+bool place(const weft_chart *chart, const weft_mat3 &view, const double corner[2], const double middle[2],
+           double *off)
 {
     double x, y, u, v, nearest = 1e9;
     int which = -1;
@@ -85,7 +88,8 @@ double now()
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void try_weft(const weft_chart *chart, const weft_mat3 &view, const weft_image &mosaic, const weft_mask &clipped, tally &t)
+void try_weft(const weft_chart *chart, const weft_mat3 &view, const weft_image &mosaic,
+              const weft_mask &clipped, tally &t)
 {
     const weft_chart_picture picture = {&mosaic, WEFT_CFA_RGGB, &clipped};
     weft_chart_pose pose;
@@ -129,8 +133,9 @@ void try_mcc(const weft_chart *chart, const weft_mat3 &view, const weft_image &m
 
 void print(const char *name, const char *who, const tally &t, int all)
 {
-    std::printf("%-34s %-5s %3d of %d found, %2d turned wrongly; middle off by %.2f px, %.2f at most; %.0f ms\n", name, who,
-                t.found, all, t.wrong, t.found ? t.off / t.found : 0, t.worst, 1e3 * t.seconds / all);
+    std::printf(
+        "%-34s %-5s %3d of %d found, %2d turned wrongly; middle off by %.2f px, %.2f at most; %.0f ms\n",
+        name, who, t.found, all, t.wrong, t.found ? t.off / t.found : 0, t.worst, 1e3 * t.seconds / all);
 }
 
 } // namespace

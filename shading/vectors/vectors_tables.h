@@ -2,8 +2,8 @@
  * The functions of this folder behind the names of the tables of reference values (core/vectors.h); a new
  * function is one row in a file vectors_SUBJECT.c.
  */
-#ifndef WEFT_SHADING_VECTORS_VECTORS_H
-#define WEFT_SHADING_VECTORS_VECTORS_H
+#ifndef WEFT_SHADING_VECTORS_VECTORS_TABLES_H
+#define WEFT_SHADING_VECTORS_VECTORS_TABLES_H
 
 #include "core/vectors.h"
 
