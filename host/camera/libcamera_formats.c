@@ -54,7 +54,7 @@ static void unpack_14(const uint8_t *b, int width, uint16_t *s)
     for (int u = 0; u < width; u++) {
         const uint8_t *const g = b + (size_t)(u / 4) * 7;
         const uint32_t low = (uint32_t)g[4] | (uint32_t)g[5] << 8 | (uint32_t)g[6] << 16;
-        s[u] = (uint16_t)(g[u % 4] << 6 | (low >> 6 * (u % 4) & 63));
+        s[u] = (uint16_t)((unsigned)g[u % 4] << 6 | (low >> (unsigned)(6 * (u % 4)) & 63u));
     }
 }
 

@@ -29,7 +29,7 @@ void weft_average_get(const weft_average *a, weft_mosaic *frame)
 {
     const uint32_t n = (uint32_t)a->n, half = n / 2;
     for (size_t i = 0; i < a->n_sites; i++)
-        frame->data[i] = a->clipped[i] ? a->white : (uint16_t)((a->sum[i] + half) / n);
+        frame->data[i] = (uint16_t)(a->clipped[i] ? a->white : (a->sum[i] + half) / n);
 }
 
 void weft_average_fini(weft_average *a)

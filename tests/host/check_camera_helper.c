@@ -16,6 +16,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -327,17 +328,28 @@ static void test_cancel_always_works(void **state)
 
 /* ---- kills ---- */
 
+static atomic_int whole_frames;
+static atomic_bool enough_kills;
+
+/* At random moments, also while a helper starts; but not so often that none would ever live, which is told
+ * after five. */
 static void *kill_at_random(void *context)
 {
+    enum { IN_A_ROW = 3 };
+    int in_a_row = 0, seen = 0;
     weft_camera_device *const camera = context;
     uint64_t seed = 42;
     const char *const wanted = getenv("WEFT_KILLS");
     const int n = wanted ? (int)strtol(wanted, NULL, 10) : 25;
-    for (int i = 0; i < n;) {
+    for (int i = 0; i < n && !atomic_load(&enough_kills);) {
         nanosleep(&(struct timespec){.tv_nsec = (long)(6e7 * weft_test_random(&seed))}, NULL);
         const long pid = weft_camera_process(camera); /* read without a lock: 0, or a helper that lives */
-        if (pid > 0 && kill((pid_t)pid, SIGKILL) == 0)
+        in_a_row = atomic_load(&whole_frames) != seen ? 0 : in_a_row;
+        seen = atomic_load(&whole_frames);
+        if (in_a_row < IN_A_ROW && pid > 0 && kill((pid_t)pid, SIGKILL) == 0) {
             i++;
+            in_a_row++;
+        }
     }
     return (void *)(intptr_t)n;
 }
@@ -359,6 +371,7 @@ static void test_kills_at_random(void **state)
             status = weft_camera_expose(camera, 1, &frame, &error);
         if (status == WEFT_OK && frame.status == WEFT_FRAME_COMPLETE) {
             n_whole++;
+            atomic_fetch_add(&whole_frames, 1);
             assert_int_equal(count_wrong(&frame), 0);
             assert_true(frame.exposure_s == wanted.exposure_s);
         } else if (status == WEFT_OK) {
@@ -371,6 +384,7 @@ static void test_kills_at_random(void **state)
             break;
         }
     }
+    atomic_store(&enough_kills, true);
     if (n_other)
         pthread_join(killer, &n_kills);
     print_message("%ld kills: %d frames whole, %d aborted, %d refusals\n", (long)(intptr_t)n_kills, n_whole,
