@@ -13,11 +13,11 @@
 typedef struct solve_args {
     const char *calibration, *output, *method;
     int geometry, resolution, gloss, bounce;
-    double mm_per_px, thickness_mm, shadow;
+    double mm_per_px, thickness_mm, shadow, memory_gib;
 } solve_args;
 
 enum { GEOMETRY_AUTO, GEOMETRY_PLANE, GEOMETRY_SENSOR };
-enum { RESOLUTION_FULL, RESOLUTION_HALF };
+enum { RESOLUTION_FULL, RESOLUTION_HALF, RESOLUTION_LINEAR };
 enum { MODEL_AUTO, MODEL_OFF };
 
 static const weft_field fields[] = {
@@ -50,9 +50,10 @@ static const weft_field fields[] = {
     {.key = "resolution",
      .type = WEFT_FIELD_CHOICE,
      .offset = offsetof(solve_args, resolution),
-     .choices = "full|half",
+     .choices = "full|half|linear",
      .def = "full",
-     .help = "full: every photosite by its own colour; half: a pixel per 2x2 cell"},
+     .help = "full: every photosite by its own colour; half: a pixel per 2x2 cell; linear: colour pictures "
+             "of the frames first, for comparison"},
     {.key = "gloss",
      .type = WEFT_FIELD_CHOICE,
      .offset = offsetof(solve_args, gloss),
@@ -81,6 +82,14 @@ static const weft_field fields[] = {
      .max = 100,
      .def = "0",
      .help = "height of the sample's surface over the sheet that was calibrated with"},
+    {.key = "memory",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(solve_args, memory_gib),
+     .unit = "GiB",
+     .min = 0.01,
+     .max = 4096,
+     .def = "2",
+     .help = "memory that may be used; a set that needs more is refused before it is read"},
     {.key = "shadow",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, shadow),
@@ -230,8 +239,10 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
     weft_solve_options options = {.sensor_geometry = args->geometry == GEOMETRY_SENSOR,
                                   .plane_geometry = args->geometry == GEOMETRY_PLANE,
                                   .half = args->resolution == RESOLUTION_HALF,
+                                  .linear = args->resolution == RESOLUTION_LINEAR,
                                   .matte = args->gloss == MODEL_OFF,
                                   .no_bounce = args->bounce == MODEL_OFF,
+                                  .memory_bytes = args->memory_gib * 1073741824.0,
                                   .mm_per_px = args->mm_per_px,
                                   .height_mm = args->thickness_mm,
                                   .shadow = args->shadow};

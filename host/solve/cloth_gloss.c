@@ -24,8 +24,8 @@ static int gather(const weft_solve_plan *plan, const weft_light_plates *plates, 
     int n = 0;
     for (int j = 0; j < ROWS; j++)
         for (int i = 0; i < COLUMNS; i++) {
-            const int row = (int)((long)plates->height * (2 * j + 1) / (2 * ROWS)) + i % 2;
-            const int block = (int)((long)n_blocks * (2 * i + 1) / (2 * COLUMNS));
+            const int row = weft_spread_over(plates->height, j, ROWS) + i % 2;
+            const int block = weft_spread_over(n_blocks, i, COLUMNS);
             weft_solve_row_in in[WEFT_LIGHTS_MAX];
             if (row >= plates->height || !all_inside(inside, plates->width, row, block))
                 continue;

@@ -54,8 +54,11 @@ static json_t *options_json(const weft_solve_options *o, const weft_maps *maps)
     const weft_solve_method *const method = o->method ? o->method : weft_solve_methods[0];
     return json_pack("{s:s, s:s, s:s, s:f, s:f, s:s, s:s}", "method", method->name, "geometry",
                      maps->geometry == WEFT_GEOMETRY_PLANE ? "plane" : "sensor", "resolution",
-                     o->half ? "half" : "full", "thickness_mm", o->height_mm, "shadow", o->shadow, "gloss",
-                     o->matte ? "off" : "auto", "bounce", o->no_bounce ? "off" : "auto");
+                     o->half     ? "half"
+                     : o->linear ? "linear"
+                                 : "full",
+                     "thickness_mm", o->height_mm, "shadow", o->shadow, "gloss", o->matte ? "off" : "auto",
+                     "bounce", o->no_bounce ? "off" : "auto");
 }
 
 static json_t *gloss_json(const weft_gloss *g)

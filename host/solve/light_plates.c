@@ -9,14 +9,13 @@ void weft_light_plates_fini(weft_light_plates *p)
     *p = (weft_light_plates){0};
 }
 
-/* A pixel for each 2x2 cell. */
-static weft_err halve(weft_plate *plate, weft_error *err)
+static weft_err demosaic(weft_plate *plate, weft_demosaic how, weft_error *err)
 {
-    weft_plate half = {0};
-    WEFT_TRY(weft_plate_demosaic(plate, WEFT_DEMOSAIC_HALF, &half, err));
-    half.noise_floor = plate->noise_floor;
+    weft_plate rgb = {0};
+    WEFT_TRY(weft_plate_demosaic(plate, how, &rgb, err));
+    rgb.noise_floor = plate->noise_floor;
     weft_plate_fini(plate);
-    *plate = half;
+    *plate = rgb;
     return WEFT_OK;
 }
 
@@ -43,18 +42,23 @@ static double light_time(const weft_set *set, int light)
     return time;
 }
 
-static weft_err load_light(const weft_set *set, int light, const weft_plate *ambient, bool half,
-                           weft_plate *plate, weft_error *err)
+static weft_err load_light(const weft_set *set, int light, const weft_plate *ambient,
+                           weft_light_reading reading, weft_plate *plate, weft_error *err)
 {
     WEFT_TRY(weft_plate_load_light(set, light, ambient, plate, err));
     if (plate->image.width != set->width || plate->image.height != set->height)
         return weft_fail(err, WEFT_ERR_MISMATCH, "%s: light %d has %d x %d pixels, the set says %d x %d",
                          set->folder, light, plate->image.width, plate->image.height, set->width,
                          set->height);
-    return half ? halve(plate, err) : WEFT_OK;
+    if (reading == WEFT_READ_HALF)
+        return demosaic(plate, WEFT_DEMOSAIC_HALF, err);
+    if (reading == WEFT_READ_LINEAR && plate->cfa != WEFT_CFA_NONE)
+        return demosaic(plate, WEFT_DEMOSAIC_LINEAR, err);
+    return WEFT_OK;
 }
 
-weft_err weft_light_plates_load(const weft_set *set, bool half, weft_light_plates *p, weft_error *err)
+weft_err weft_light_plates_load(const weft_set *set, weft_light_reading reading, weft_light_plates *p,
+                                weft_error *err)
 {
     weft_plate ambient = {0};
     bool present = false;
@@ -68,7 +72,7 @@ weft_err weft_light_plates_load(const weft_set *set, bool half, weft_light_plate
         p->most[p->n] = saturation_limit(set, p->n);
         p->time[p->n] = light_time(set, p->n);
         p->n++; /* a plate that fails half way is freed with the others */
-        status = load_light(set, p->n - 1, present ? &ambient : NULL, half, plate, err);
+        status = load_light(set, p->n - 1, present ? &ambient : NULL, reading, plate, err);
         if (status == WEFT_OK)
             status = weft_progress_step(&progress, 1, err);
     }

@@ -15,12 +15,28 @@ typedef struct weft_light_plates {
     double most[WEFT_LIGHTS_MAX]; /* 98 % of saturation as linear value; 0 for brackets and pictures */
 } weft_light_plates;
 
-/** Reads every light, the ambient plate subtracted.  `half` makes one RGB pixel of each 2x2 cell or pixels.
+/** What becomes of the photosites of a mosaic. */
+typedef enum weft_light_reading {
+    WEFT_READ_SITES,  /* they stay what they are */
+    WEFT_READ_HALF,   /* one RGB pixel of each 2x2 cell (or 2x2 pixels of a picture) */
+    WEFT_READ_LINEAR, /* every frame is demosaiced first, as others do: for comparison, three times the memory
+                       */
+} weft_light_reading;
+
+/** Reads every light, the ambient plate subtracted.
  *  Shows progress.  @return what the readers say, WEFT_ERR_MISMATCH for plates that differ. */
-weft_err weft_light_plates_load(const weft_set *set, bool half, weft_light_plates *plates, weft_error *err);
+weft_err weft_light_plates_load(const weft_set *set, weft_light_reading reading, weft_light_plates *plates,
+                                weft_error *err);
 void weft_light_plates_fini(weft_light_plates *plates);
 
 /** Points at row `row` of every light. */
 void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_row_in in[WEFT_LIGHTS_MAX]);
+
+/** The middle of part i of n equal parts of 0 .. `length` - 1. */
+static inline int weft_spread_over(int length, int i, int n)
+{
+    const long twice = 2L * i + 1;
+    return (int)(length * twice / (2L * n));
+}
 
 #endif

@@ -230,7 +230,7 @@ WEFT_INLINE void try_all(const weft_solve_samples *s, const scaled_light *scaled
 WEFT_INLINE void try_some(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
 {
     const long n = s->n_lights, all = n * (n - 1) * (n - 2) / 6;
-    long next = all / (2 * MOST_TRIPLES), number = 0, tried = 0;
+    long next = all / (2L * MOST_TRIPLES), number = 0, tried = 0;
     for (int i = 0; i < n; i++)
         for (int j = i + 1; j < n; j++) {
             for (int l = j + 1; l < n; l++, number++) {
@@ -243,7 +243,7 @@ WEFT_INLINE void try_some(const weft_solve_samples *s, const scaled_light *scale
                 const triple t = {i, j, l, &ij, &il, &jl};
                 try_triple(s, scaled, &t, best);
                 tried++;
-                next = (2 * tried + 1) * all / (2 * MOST_TRIPLES);
+                next = (2 * tried + 1) * all / (2L * MOST_TRIPLES);
             }
         }
 }

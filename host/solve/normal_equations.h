@@ -267,10 +267,11 @@ WEFT_INLINE void weft_lane_leave_shadows(const weft_solve_samples *s, weft_lane_
             lit[k] += w;
             all[k] += s->at[j].weight[k];
         }
-    for (int j = 0; j < s->n_lights; j++)
+    for (int j = 0; j < s->n_lights; j++) {
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++)
             weights[j].at[k] = lit[k] > 3.5F ? weights[j].at[k] : s->at[j].weight[k];
+    }
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
         dropped[k] = lit[k] > 3.5F ? all[k] - lit[k] : 0.0F;

@@ -88,15 +88,15 @@ static double misfit(const decoding *d, bool decoded)
     const int n_blocks = d->plates->width / WEFT_SOLVE_LANES;
     int n = 0;
     for (int j = 0; j < ROWS && n_blocks > 0; j++) {
-        const int row = (int)((long)d->plates->height * (2 * j + 1) / (2 * ROWS));
+        const int row = weft_spread_over(d->plates->height, j, ROWS);
         weft_solve_row_in in[WEFT_LIGHTS_MAX];
         weft_light_plates_row(d->plates, row, in);
         if (decoded)
             decode_row(d, in);
         for (int i = 0; i < COLUMNS; i++) {
             weft_solve_answers a;
-            const int block = (int)((long)n_blocks * (2 * i + 1) / (2 * COLUMNS));
-            const size_t at = (size_t)row * (size_t)d->plates->width + (size_t)(block * WEFT_SOLVE_LANES);
+            const int block = weft_spread_over(n_blocks, i, COLUMNS);
+            const size_t at = (size_t)row * (size_t)d->plates->width + (size_t)block * WEFT_SOLVE_LANES;
             weft_solve_gather(d->plan, row, block, in, d->samples);
             weft_method_lsq.solve(d->samples, &a);
             for (int k = 0; k < WEFT_SOLVE_LANES; k++)

@@ -96,7 +96,7 @@ static void judge_block(const relight_job *job, int light, int row, int first, i
 static void relight_rows(void *context, int band, int row_begin, int row_end)
 {
     const relight_job *const job = context;
-    weft_solve_samples *const all = &job->scratch[2 * band], *const others = all + 1;
+    weft_solve_samples *const all = &job->scratch[2 * (size_t)band], *const others = all + 1;
     for (int row = row_begin; row < row_end; row++) {
         weft_solve_row_in in[WEFT_LIGHTS_MAX];
         weft_light_plates_row(job->plates, row, in);
@@ -179,7 +179,8 @@ weft_err weft_relight_set(const weft_set *set, const weft_calibration *cal, cons
     weft_mask inside = {0};
     weft_relight to = {0};
     WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
-    weft_err status = weft_light_plates_load(set, options->half, &plates, err);
+    weft_err status =
+        weft_light_plates_load(set, options->half ? WEFT_READ_HALF : WEFT_READ_SITES, &plates, err);
     if (status == WEFT_OK && set->mask_file && !options->half)
         status = weft_set_load_mask(set, &inside, err);
     if (status == WEFT_OK)

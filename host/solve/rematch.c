@@ -294,7 +294,7 @@ weft_err weft_rematch_init(weft_rematch *match, const weft_preview_surface *surf
     *match = (weft_rematch){
         .surface = surface, .maps = maps, .set = set, .cal = *cal, .height_mm = height_mm, .exposure = 1};
     WEFT_TRY(check(match, cal_folder, err));
-    WEFT_TRY(weft_light_plates_load(set, false, &match->plates, err));
+    WEFT_TRY(weft_light_plates_load(set, WEFT_READ_SITES, &match->plates, err));
     weft_err status = follow_strip(match, err);
     if (status == WEFT_OK)
         status = find_exposure(match, err);

@@ -39,6 +39,31 @@ static bool has_near_light(const weft_calibration *cal)
     return false;
 }
 
+/* Bytes at the worst moment: while rows are solved, all lights and the maps; afterwards the maps, and either
+ * what demosaicing the albedo takes or the maps on the plane.  Reading needs the ambient plate and a frame
+ * beside. */
+static double bytes_needed(const weft_set *set, const weft_solve_options *options)
+{
+    const double shrink = options->half ? 4 : 1, pixels = (double)set->width * set->height / shrink;
+    const int n = weft_set_n_lights(set);
+    const double sites = set->cfa != WEFT_CFA_NONE && !options->half && !options->linear ? 1 : 3;
+    const double plates = pixels * n * (4 * sites + 1), maps = pixels * 39,
+                 frame = (double)set->width * set->height * 14;
+    return fmax(plates + fmax(maps, frame), 2.2 * maps) + 64e6;
+}
+
+static weft_err require_memory(const weft_set *set, const weft_solve_options *options, weft_error *err)
+{
+    const double needed = bytes_needed(set, options);
+    if (!(options->memory_bytes > 0) || needed <= options->memory_bytes)
+        return WEFT_OK;
+    return weft_fail(err, WEFT_ERR_NOMEM,
+                     "%s: %d lights of %d x %d pixels need %.2f GiB, %.2f are allowed (give --memory %.1f%s)",
+                     set->folder, weft_set_n_lights(set), set->width, set->height, needed / 1073741824.0,
+                     options->memory_bytes / 1073741824.0, ceil(needed / 107374182.4) / 10,
+                     options->half ? "" : ", or --resolution half");
+}
+
 weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
                           const weft_solve_options *options, weft_error *err)
 {
@@ -55,6 +80,7 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
                          set->folder, n, cal_folder, cal->n_lights);
     if (cal->has_camera)
         WEFT_TRY(weft_calibration_require_size(cal, set->width, set->height, cal_folder, err));
+    WEFT_TRY(require_memory(set, options, err));
     return weft_refuse_cone(cal, cal_folder, options->height_mm, err);
 }
 
@@ -62,8 +88,8 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
 
 typedef struct solve_job {
     const weft_solve_plan *plan;
-    const weft_light_plates *plates;
-    const weft_mask *inside; /* at solving size; data NULL: everywhere */
+    weft_light_plates *plates; /* freed once all is solved */
+    const weft_mask *inside;   /* at solving size; data NULL: everywhere */
     const weft_calibration *cal;
     weft_maps *maps;
 } solve_job;
@@ -145,6 +171,7 @@ static weft_err solve_all_rows(solve_job *job, const weft_solve_options *options
 {
     const int height = job->maps->height;
     WEFT_TRY(weft_parallel_rows_progress(height, solve_rows, job, "solving", err));
+    weft_light_plates_fini(job->plates); /* most of the memory; what follows needs some */
     WEFT_TRY(take_off_bounce(job, options, pixel, run, err));
     if (job->plan->cfa != WEFT_CFA_NONE)
         WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, err));
@@ -258,7 +285,11 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     double clock = weft_clock_s();
     weft_err status = load_mask(set, options->half, &inside, err);
     if (status == WEFT_OK)
-        status = weft_light_plates_load(set, options->half, &plates, err);
+        status = weft_light_plates_load(set,
+                                        options->half     ? WEFT_READ_HALF
+                                        : options->linear ? WEFT_READ_LINEAR
+                                                          : WEFT_READ_SITES,
+                                        &plates, err);
     run->seconds.read = weft_clock_s() - clock;
     clock = weft_clock_s();
     if (status == WEFT_OK)

@@ -13,8 +13,10 @@ typedef struct weft_solve_options {
     bool sensor_geometry;            /* false: the plane, where the calibration has a camera */
     bool plane_geometry;             /* true: the plane or nothing */
     bool half;                       /* a pixel for each 2x2 cell, from its luminance */
+    bool linear;                     /* frames are demosaiced before they are solved: for comparison */
     bool matte;                      /* true: no mirror light is looked for */
     bool no_bounce;                  /* true: light from yarn to yarn is left in */
+    double memory_bytes;             /* what may be used; 0: whatever is needed */
     double mm_per_px;                /* of the plane; 0: as the sensor at the middle */
     double height_mm;                /* of the sample's surface over the calibrated plane */
     double shadow; /* samples below this part of the pixel's brightest are left out; 0: no such rule */

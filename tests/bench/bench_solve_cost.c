@@ -55,23 +55,24 @@ static double bend(const curve *c, int m)
     return worst / c->seconds[m][c->n - 1];
 }
 
-static int draw(const curve *c, const char *title, const char *label, const char *folder, const char *name)
+static int draw(const curve *c, const char *title, const char *label, const char *folder, const char *name,
+                int n_methods)
 {
     char path[1024];
     weft_plot plot;
     weft_text_buffer text = {0};
     double most = 0;
-    for (int m = 0; m < METHODS; m++)
+    for (int m = 0; m < n_methods; m++)
         most = fmax(most, c->seconds[m][c->n - 1]);
     const weft_plot_spec spec = {.title = title,
                                  .width = 560,
                                  .height = 360,
                                  .x = {label, 0, c->x[c->n - 1] * 1.03, false},
                                  .y = {"seconds, one core", 0, most * 1.05, false},
-                                 .legend_rows = METHODS,
+                                 .legend_rows = 1,
                                  .standalone = true};
     weft_plot_begin(&plot, &spec, &text);
-    for (int m = 0; m < METHODS; m++) {
+    for (int m = 0; m < n_methods; m++) {
         weft_plot_line(&plot, m, c->n, c->x, c->seconds[m], method_names[m]);
         weft_plot_dots(&plot, m, 3, c->n, c->x, c->seconds[m], NULL);
         printf("%s: %.1f %% off a straight line at most\n", method_names[m], 100 * bend(c, m));
@@ -99,11 +100,11 @@ int main(int argc, char **argv)
     for (int i = 0; i < 6; i++)
         measure_point(&size, sides[i][0] * sides[i][1] * 1e-6, sides[i][0], sides[i][1], 10);
     if (argc > 1)
-        failed |= draw(&size, "Ten lights", "megapixels", argv[1], "solve-cost-size.svg");
+        failed |= draw(&size, "Ten lights", "megapixels", argv[1], "solve-cost-size.svg", METHODS);
     printf("lights    lsq          robust, matte  all searched   (1 Mpixel)\n");
     for (int i = 0; i < 8; i++)
         measure_point(&number, lights[i], 1232, 816, lights[i]);
     if (argc > 1)
-        failed |= draw(&number, "1 megapixel", "lights", argv[1], "solve-cost-lights.svg");
+        failed |= draw(&number, "1 megapixel", "lights", argv[1], "solve-cost-lights.svg", 2);
     return failed;
 }

@@ -405,6 +405,17 @@ static void test_three_lights_are_too_few(void **state)
     weft_set_fini(&three);
 }
 
+static void test_memory_is_asked_before_it_is_used(void **state)
+{
+    (void)state;
+    weft_maps maps = {0};
+    weft_solve_options options = {.memory_bytes = 50e6};
+    assert_fails(solve_with(&made, &options, &maps, err), WEFT_ERR_NOMEM, "give --memory");
+    options.memory_bytes = 100e6;
+    assert_ok(solve_with(&made, &options, &maps, err));
+    weft_maps_fini(&maps);
+}
+
 /* ---- relighting ---- */
 
 static void test_lights_predict_each_other(void **state)
@@ -445,6 +456,7 @@ int main(void)
         cmocka_unit_test(test_distant_lights_need_no_camera),
         cmocka_unit_test(test_lights_in_a_cone_are_refused),
         cmocka_unit_test(test_three_lights_are_too_few),
+        cmocka_unit_test(test_memory_is_asked_before_it_is_used),
         cmocka_unit_test(test_lights_predict_each_other),
     };
     return cmocka_run_group_tests(tests, make_set, free_set);
