@@ -135,7 +135,7 @@ static const char style[] =
     "h1{font-size:24px;margin:8px 0}h2{font-size:19px;margin:28px 0 8px}svg{max-width:100%;height:auto}\n"
     ".soft{color:#57606a;font-size:13px}table{border-collapse:collapse;font-size:14px}\n"
     "th,td{text-align:left;padding:3px 12px 3px 0;vertical-align:middle}th{font-weight:600}\n"
-    "td.n{text-align:right;font-variant-numeric:tabular-nums}tr+tr td{border-top:1px solid #d8dee4}\n"
+    "th.n,td.n{text-align:right;font-variant-numeric:tabular-nums}tr+tr td{border-top:1px solid #d8dee4}\n"
     ".tag{display:inline-block;min-width:92px;text-align:center;border-radius:4px;color:#fff;font-size:13px}"
     "\n"
     ".good{background:#1a7f37}.kept{background:#57606a}.bad{background:#cf222e}.wait{background:#9a6700}\n"
@@ -231,9 +231,10 @@ static weft_err write_page(const weft_batch *batch, const json_t *report, const 
     add_head(&page, batch, report);
     add_dots(&page, sets, "residual_mean", 100, "Residual", "%");
     add_dots(&page, sets, "seconds", 1, "Time", "s");
-    weft_text_add(&page,
-                  "<h2>Sets</h2>\n<table><tr><th></th><th>set</th><th></th><th>width</th><th>height</th>"
-                  "<th>answered, %%</th><th>residual, %%</th><th>uncertainty, deg</th><th>s</th></tr>\n");
+    weft_text_add(&page, "<h2>Sets</h2>\n<table><tr><th></th><th>set</th><th></th><th class=n>width</th><th "
+                         "class=n>height</th>"
+                         "<th class=n>answered, %%</th><th class=n>residual, %%</th><th class=n>uncertainty, "
+                         "deg</th><th class=n>s</th></tr>\n");
     for (int i = 0; i < batch->n_items; i++)
         add_row(&page, json_array_get(sets, (size_t)i), &batch->items[i]);
     weft_text_add(&page, "</table>\n</body></html>\n");

@@ -1,5 +1,6 @@
 /* weft solve: normals and albedo of captured sets. */
 #include "host/cli/command.h"
+#include "host/cli/solve_explain.h"
 
 #include "core/file.h"
 #include "core/log.h"
@@ -11,7 +12,8 @@
 #include <string.h>
 
 typedef struct solve_args {
-    const char *calibration, *output, *method;
+    const char *calibration, *output, *method, *explain_plot;
+    weft_numbers explain;
     int geometry, resolution, gloss, bounce;
     double mm_per_px, thickness_mm, shadow, memory_gib;
 } solve_args;
@@ -33,7 +35,6 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(solve_args, output),
      .unit = "DIR",
-     .required = true,
      .help = "maps folder to write; with several sets the folder for NAME.maps of each"},
     {.key = "method",
      .type = WEFT_FIELD_TEXT,
@@ -98,6 +99,16 @@ static const weft_field fields[] = {
      .max = 0.9,
      .def = "0",
      .help = "leave out samples below this part of the pixel's brightest one"},
+    {.key = "explain",
+     .type = WEFT_FIELD_F64S,
+     .offset = offsetof(solve_args, explain),
+     .unit = "X,Y",
+     .help = "write no maps but say what was seen at this pixel of theirs, and what became of each sample"},
+    {.key = "explain-plot",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(solve_args, explain_plot),
+     .unit = "FILE.svg",
+     .help = "with --explain: draw it"},
     {0},
 };
 
@@ -247,6 +258,11 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
                                   .height_mm = args->thickness_mm,
                                   .shadow = args->shadow};
     WEFT_TRY(weft_solve_find_method(args->method, &options.method, err));
+    if (args->explain.n > 0 && inv->n_operands > 1)
+        return weft_fail(err, WEFT_ERR_USAGE, "--explain is for one set");
+    if (args->explain.n > 0)
+        return weft_print_explanation(inv, inv->operands[0], cal, args->calibration, &options, &args->explain,
+                                      args->explain_plot, err);
     WEFT_TRY(check_all(inv, args, cal, &options, err));
     if (inv->n_operands > 1)
         WEFT_TRY(weft_folder_create(args->output, err));
@@ -264,6 +280,8 @@ static weft_err run(const weft_invocation *inv, const void *args_, weft_error *e
 {
     const solve_args *const args = args_;
     weft_calibration cal;
+    if (!args->output && args->explain.n == 0)
+        return weft_fail(err, WEFT_ERR_USAGE, "--output is missing");
     WEFT_TRY(weft_calibration_load(args->calibration, &cal, err));
     const weft_err status = run_with(inv, args, &cal, err);
     weft_calibration_fini(&cal);

@@ -78,6 +78,17 @@ expect 1 'absent.cal' "$weft" solve flat.set -c absent.cal -o x
 expect 1 'absent.set' "$weft" solve absent.set -c flat.cal -o x
 expect 1 'there is no folder nowhere' "$weft" solve flat.set -c flat.cal -o nowhere/x
 expect 1 'weft calibrate lens' "$weft" solve flat.set -c flat.cal -o x --geometry plane
+# one pixel explained
+expect 0 '5 of 5 lights' "$weft" solve flat.set -c flat.cal --explain 16,12 --explain-plot pixel.svg
+expect 1 'pixel.svg' "$weft" solve flat.set -c flat.cal --explain 16,12 --explain-plot pixel.svg
+"$weft" solve flat.set -c flat.cal --explain 3,4 --json | jq -e \
+    '.n_used == 5 and (.lights | length) == 5 and .lights[2].used and .normal[2] > 0.9999 and .colour == -1' >/dev/null
+python3 -c 'import xml.dom.minidom; xml.dom.minidom.parse("pixel.svg")'
+expect 1 'the maps are 32 x 24' "$weft" solve flat.set -c flat.cal --explain 32,0
+expect 2 'column and row' "$weft" solve flat.set -c flat.cal --explain 3
+expect 2 'column and row' "$weft" solve flat.set -c flat.cal --explain 3.5,2
+expect 2 '--output is missing' "$weft" solve flat.set -c flat.cal
+
 rm flat/p3.png
 expect 1 'p3.png' "$weft" solve flat.set -c flat.cal -o x
 expect 1 'line 5: the picture' "$weft" import flat -o again.set
