@@ -31,6 +31,7 @@ extern const weft_command weft_cmd_live;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_bake;
+extern const weft_command weft_cmd_weave;
 extern const weft_command weft_cmd_preview;
 
 /* In the order of the help: the way of the data, from the lights to the picture.  One a line. */
@@ -59,6 +60,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_check,
     &weft_cmd_batch,
     &weft_cmd_compare,
+    &weft_cmd_weave,
     &weft_cmd_bake,
     &weft_cmd_preview,
     &weft_cmd_contact,
