@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define SAMPLES 41
+#define MIDDLE  20 /* of the samples */
+#define SAMPLES (2 * MIDDLE + 1)
 #define REACH   0.36 /* of the spacing, to both sides of the edge */
 
 static double grey_at(const uint8_t *grey, int width, int height, double u, double v)
@@ -25,7 +26,7 @@ static double edge_width(const uint8_t *grey, int width, int height, const float
     const double step = 2 * REACH * length / (SAMPLES - 1);
     double profile[SAMPLES], least = 255, most = 0, slope = 0;
     for (int k = 0; k < SAMPLES; k++) {
-        const double t = (k - SAMPLES / 2) * step;
+        const double t = (k - MIDDLE) * step;
         profile[k] = grey_at(grey, width, height, mu - dv / length * t, mv + du / length * t);
         least = fmin(least, profile[k]);
         most = fmax(most, profile[k]);

@@ -258,8 +258,8 @@ static double bend_of(const fit_work *work)
     double xx = 0, xy = 0, yy = 0, x = 0, y = 0, z = 0, xz = 0, yz = 0;
     const double n = work->n_points;
     for (int i = 0; i < work->n_points; i++) {
-        const double px = (double)work->bent[3 * i], py = (double)work->bent[3 * i + 1],
-                     pz = (double)work->bent[3 * i + 2];
+        const float *const at = work->bent + 3 * (size_t)i;
+        const double px = (double)at[0], py = (double)at[1], pz = (double)at[2];
         x += px, y += py, z += pz, xx += px * px, xy += px * py, yy += py * py, xz += px * pz, yz += py * pz;
     }
     const weft_mat3 m = {{n, x, y, x, xx, xy, y, xy, yy}};
@@ -269,8 +269,8 @@ static double bend_of(const fit_work *work)
     const weft_vec3 plane = weft_mat3_apply(&inverse, (weft_vec3){z, xz, yz});
     double least = INFINITY, most = -INFINITY;
     for (int i = 0; i < work->n_points; i++) {
-        const double off = (double)work->bent[3 * i + 2] - plane.x - plane.y * (double)work->bent[3 * i] -
-                           plane.z * (double)work->bent[3 * i + 1];
+        const float *const at = work->bent + 3 * (size_t)i;
+        const double off = (double)at[2] - plane.x - plane.y * (double)at[0] - plane.z * (double)at[1];
         least = fmin(least, off);
         most = fmax(most, off);
     }

@@ -154,7 +154,7 @@ int calibrate(int n_views, int n_points, const float *object, const float *image
         cv::Mat k, d, sigma, sigma_views, sigma_points, per_view;
         std::vector<cv::Mat> rotations, translations;
         std::vector<cv::Point3f> board = objects[0];
-        const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 200, 1e-12);
+        const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 60, 1e-10);
         estimate->rms_px =
             hinge < 0 ? cv::calibrateCamera(objects, images, {width, height}, k, d, rotations, translations,
                                             sigma, sigma_views, per_view, flags_of(terms), until)

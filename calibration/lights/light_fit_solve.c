@@ -292,11 +292,11 @@ static void eliminate_common(normal *q, double weight, double residual)
 
 static void add_cell(const fit_problem *f, normal *q, int cell)
 {
-    double r[WEFT_LIGHTS_MAX];
+    double r[WEFT_LIGHTS_MAX] = {0};
     const fit_surface s = fit_surface_at(f, cell);
     for (int l = 0; l < q->scope.n; l++)
-        r[l] = fit_lamp_gradient(f, &f->lamps[q->scope.first + l], cell, &s, q->by_lamp + l * FIT_GEOMETRY,
-                                 q->by_shape + l * FIT_SHAPE);
+        r[l] = fit_lamp_gradient(f, &f->lamps[q->scope.first + l], cell, &s,
+                                 q->by_lamp + (size_t)l * FIT_GEOMETRY, q->by_shape + (size_t)l * FIT_SHAPE);
     for (int c = 0; c < 3; c++) {
         double weight = 0, residual = 0;
         memset(q->sum, 0, (size_t)q->n * sizeof *q->sum);

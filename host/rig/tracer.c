@@ -166,11 +166,9 @@ void weft_rig_trace(const weft_rig_tracer *tracer, const weft_fabric_patch *patc
         trace_plate(tracer, gx, gy, hit);
     else if (sample->n_balls)
         trace_balls(tracer, gx, gy, hit);
-    else if (strip)
-        hit_table(hit, gx, gy);
-    else if (sample->has_cloth)
+    else if (sample->has_cloth && !strip)
         trace_cloth(tracer, patch, gx, gy, hit);
-    else if (sample->has_sheet)
+    else if (sample->has_sheet && !strip)
         trace_sheet(tracer, gx, gy, hit);
     else
         hit_table(hit, gx, gy);

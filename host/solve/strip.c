@@ -9,10 +9,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define PARTS        8    /* along the strip */
-#define PIXELS_LEAST 64   /* of each colour in a part */
-#define UNEVEN_MOST  0.03 /* of a part against the whole; a lamp that is another one differs by more */
-#define CLIPPED_MOST 0.01
+#define PARTS         8    /* along the strip */
+#define PIXELS_WANTED 512  /* of each colour, 64 in a part */
+#define UNEVEN_MOST   0.03 /* of a part against the whole; a lamp that is another one differs by more */
+#define CLIPPED_MOST  0.01
 
 weft_err weft_strip_of_set(const weft_set *set, weft_strip *strip, bool *present, weft_error *err)
 {
@@ -146,11 +146,11 @@ static weft_err measure_light(strip_work *w, int light, weft_strip_drift *drift,
             return weft_fail(err, WEFT_ERR_RANGE,
                              "light %d: %.0f %% of the white strip is saturated; expose shorter", light,
                              100.0 * (double)w->n_clipped / (double)w->n_seen);
-        if (n < PARTS * PIXELS_LEAST)
+        if (n < PIXELS_WANTED)
             return weft_fail(
                 err, WEFT_ERR_RANGE,
                 "light %d: the white strip has %ld usable pixels of a colour, wanted %d; make it wider",
-                light, n, PARTS * PIXELS_LEAST);
+                light, n, PIXELS_WANTED);
         drift->gain[light][c] = gain;
         drift->sigma = fmax(drift->sigma, 1.25 * scatter / sqrt((double)n)); /* of a median */
     }

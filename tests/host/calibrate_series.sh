@@ -6,7 +6,7 @@ set -eu
 [ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
 [ -f "$WEFT_TEST_BIN/libweft_lens_opencv.so" ] || { echo "skipped: this build has no OpenCV"; exit 77; }
 series() {
-    python3 "$WEFT_TEST_SOURCE/tests/host/calibrate_series.py" --bin "$WEFT_TEST_BIN" --work "$work/series" \
+    python3 "$WEFT_TEST_SOURCE/tests/host/calibrate_series.py" --bin "$WEFT_TEST_BIN" --work "$PWD/series" \
         --flatness "$WEFT_TEST_BUILD/tests/flatness" --size "${WEFT_SERIES_SIZE:-1232x816}" "$@"
 }
 series --seeds "${WEFT_SERIES_SEEDS:-1}" --check
