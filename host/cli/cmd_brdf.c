@@ -1,7 +1,9 @@
 #include "host/cli/brdf_eval.h"
+#include "host/cli/brdf_plot.h"
 #include "host/cli/command.h"
 
 #include "core/csv.h"
+#include "core/file.h"
 #include "core/mem.h"
 #include "shading/brdf/brdf.h"
 #include "shading/vectors/vectors_tables.h"
@@ -10,8 +12,9 @@
 #include <string.h>
 
 typedef struct brdf_args {
-    const char *eval;
+    const char *eval, *plot;
     weft_texts params;
+    bool furnace, reciprocity;
 } brdf_args;
 
 static const weft_field fields[] = {
@@ -20,6 +23,19 @@ static const weft_field fields[] = {
      .offset = offsetof(brdf_args, eval),
      .unit = "FILE.csv",
      .help = "print the rows of a table with the value at each appended"},
+    {.key = "plot",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(brdf_args, plot),
+     .unit = "FILE",
+     .help = "draw it: NAME.svg lobes in the plane of incidence, NAME.png or .exr a slice over half angles"},
+    {.key = "furnace",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(brdf_args, furnace),
+     .help = "the share of an even white room's light that comes back, at eight views"},
+    {.key = "reciprocity",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(brdf_args, reciprocity),
+     .help = "how much the value changes when light and view change places"},
     {.key = "param",
      .short_opt = 'p',
      .type = WEFT_FIELD_TEXTS,
@@ -154,11 +170,69 @@ static weft_err eval_model(const weft_invocation *inv, const weft_brdf *brdf, co
     return status;
 }
 
+/* Furnace and reciprocity: as text or JSON. */
+static weft_err print_proofs(const weft_invocation *inv, const brdf_args *a, const weft_brdf *brdf,
+                             const double *values, weft_error *err)
+{
+    enum { PAIRS = 20000 };
+    double albedo[WEFT_FURNACE_VIEWS][3] = {{0}};
+    const double change = a->reciprocity ? weft_brdf_reciprocity(brdf, values, PAIRS) : 0;
+    if (a->furnace)
+        weft_brdf_furnace(brdf, values, albedo);
+    if (inv->json) {
+        json_t *const rows = json_array();
+        for (int i = 0; i < WEFT_FURNACE_VIEWS && a->furnace; i++)
+            json_array_append_new(rows, json_pack("{s:f, s:[f, f, f]}", "nv", weft_furnace_nv[i], "albedo",
+                                                  albedo[i][0], albedo[i][1], albedo[i][2]));
+        json_t *const o = json_pack("{s:s, s:o}", "model", brdf->name, "furnace", rows);
+        if (a->reciprocity)
+            json_object_set_new(o, "largest_change", json_real(change));
+        return weft_print_json(inv, o, err);
+    }
+    for (int i = -1; i < WEFT_FURNACE_VIEWS && a->furnace; i++)
+        if (i < 0)
+            fprintf(inv->out, "%6s  %-9s %-9s %-9s  (directional albedo)\n", "n.v", "red", "green", "blue");
+        else
+            fprintf(inv->out, "%6g  %.7f %.7f %.7f\n", weft_furnace_nv[i], albedo[i][0], albedo[i][1],
+                    albedo[i][2]);
+    if (a->reciprocity)
+        fprintf(inv->out, "%s: light and view changed places change f by %.2g of itself at most (%d pairs)\n",
+                brdf->name, change, PAIRS);
+    return WEFT_OK;
+}
+
+/* --plot, --furnace, --reciprocity. */
+static weft_err examine(const weft_invocation *inv, const brdf_args *a, const char *name, weft_error *err)
+{
+    const weft_brdf *brdf;
+    double values[WEFT_BRDF_MAX_PLANES];
+    if (!name || a->eval)
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--plot, --furnace and --reciprocity want the NAME of a model%s",
+                         a->eval ? ", and no --eval" : "");
+    WEFT_TRY(weft_brdf_find(name, &brdf, err));
+    weft_brdf_defaults(brdf, values);
+    for (int i = 0; i < a->params.n; i++)
+        WEFT_TRY(weft_brdf_set(brdf, a->params.values[i], values, err));
+    if (a->plot) {
+        WEFT_TRY(weft_file_refuse_existing(a->plot, inv->force, err));
+        WEFT_TRY(weft_brdf_plot(brdf, values, a->plot, err));
+    }
+    if (a->furnace || a->reciprocity)
+        return print_proofs(inv, a, brdf, values, err);
+    if (inv->json)
+        return weft_print_json(inv, json_pack("{s:s, s:s}", "model", name, "plot", a->plot), err);
+    fprintf(inv->out, "%s: %s\n", a->plot, name);
+    return WEFT_OK;
+}
+
 static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const brdf_args *const a = args;
     const char *const name = inv->n_operands ? inv->operands[0] : NULL;
     const weft_brdf *brdf = NULL;
+    if (a->plot || a->furnace || a->reciprocity)
+        return examine(inv, a, name, err);
     if (!a->eval) {
         if (name)
             WEFT_TRY(weft_brdf_find(name, &brdf, err));
@@ -183,7 +257,7 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
 
 const weft_command weft_cmd_brdf = {
     .name = "brdf",
-    .summary = "list the reflectance models with their parameters, evaluate them at given angles",
+    .summary = "list the reflectance models with their parameters, evaluate, plot and prove them",
     .operands = "[NAME]",
     .min_operands = 0,
     .max_operands = 1,

@@ -41,3 +41,16 @@ printf 'alpha,nv\n0.5,0.5\n0.5,1.5\n' >"$work/t.csv"
 expect 1 'row 2: there is no value' "$weft" brdf cloth_albedo --eval "$work/t.csv"
 printf 'alpha,nv\n0.5,0\n' >"$work/t.csv"
 expect 0 '0.5,0,' "$weft" brdf ggx_furnace --eval "$work/t.csv"
+
+# plots and proofs: 1 - ln 2 of a white rough conductor's light comes back straight up (Smith, alpha 1)
+expect 0 'lobes.svg: cloth' "$weft" brdf cloth --plot lobes.svg -p alpha=0.4
+python3 -c 'import xml.dom.minidom as x; assert len(x.parse("lobes.svg").getElementsByTagName("path")) + len(x.parse("lobes.svg").getElementsByTagName("polyline")) >= 4'
+expect 1 'lobes.svg' "$weft" brdf cloth --plot lobes.svg
+expect 0 'slice.png' "$weft" brdf disney --plot slice.png
+expect 2 'NAME.svg for lobes' "$weft" brdf ggx --plot lobes.pdf
+expect 2 'NAME of a model' "$weft" brdf --furnace
+"$weft" brdf ggx-specular --furnace --reciprocity -p f0=1 -p alpha=1 --json | python3 -c '
+import json, math, sys
+d = json.load(sys.stdin)
+assert abs(d["furnace"][-1]["albedo"][2] - (1 - math.log(2))) < 1e-5 and d["largest_change"] < 1e-12, d'
+expect 0 'change f by' "$weft" brdf disney --reciprocity --furnace
