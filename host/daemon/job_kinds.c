@@ -24,7 +24,7 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "calibrate report", .reads = "*", .writes = "output"},
     {.command = "solve", .reads = "*|calibration", .writes = "output", .texts = "method"},
     {.command = "compare", .reads = "*|mask"},
-    {.command = "preview", .reads = "*|match|calibration", .writes = "output", .texts = "brdf|param"},
+    {.command = "preview", .reads = "*|match|calibration|env", .writes = "output", .texts = "brdf|param|lamp|columns"},
     {.command = "contact", .reads = "*", .writes = "output", .texts = "brdf|param"},
     {.command = "library reindex", .reads = "library"},
     {0},
