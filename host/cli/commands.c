@@ -23,6 +23,7 @@ extern const weft_command weft_cmd_light_on;
 extern const weft_command weft_cmd_light_run;
 extern const weft_command weft_cmd_light_set;
 extern const weft_command weft_cmd_light_status;
+extern const weft_command weft_cmd_layout;
 extern const weft_command weft_cmd_library_find;
 extern const weft_command weft_cmd_library_list;
 extern const weft_command weft_cmd_library_reindex;
@@ -58,6 +59,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_import,
     &weft_cmd_solve,
     &weft_cmd_check,
+    &weft_cmd_layout,
     &weft_cmd_batch,
     &weft_cmd_compare,
     &weft_cmd_weave,

@@ -96,3 +96,12 @@ test ! -e x -a ! -e again.set -a ! -e again.cal
 expect 2 'different kinds' "$weft" compare flat.maps flat/p1.png
 expect 0 'PSNR             inf dB' "$weft" compare flat/p1.png flat/p2.png
 expect 0 'light direction  mean 0.000' "$weft" compare flat.cal flat.cal
+
+# a layout of lights
+printf 'x_mm,y_mm,z_mm\n200,0,200\n-200,0,200\n0,200,200\n0,-200,200\n' >lights.csv
+expect 0 'gain of the directions 1.41' "$weft" layout lights.csv --plot noise.svg
+expect 1 'noise.svg' "$weft" layout lights.csv --plot noise.svg
+python3 -c 'import xml.dom.minidom; xml.dom.minidom.parse("noise.svg")'
+"$weft" layout lights.csv --json | jq -e '.mean_deg > 0 and (.lights | length) == 4' >/dev/null
+expect 2 '--plate wants' "$weft" layout lights.csv --plate 3
+expect 1 'absent.csv' "$weft" layout absent.csv
