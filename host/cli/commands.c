@@ -32,6 +32,7 @@ extern const weft_command weft_cmd_live;
 extern const weft_command weft_cmd_solve;
 extern const weft_command weft_cmd_contact;
 extern const weft_command weft_cmd_bake;
+extern const weft_command weft_cmd_lint;
 extern const weft_command weft_cmd_weave;
 extern const weft_command weft_cmd_preview;
 
@@ -62,6 +63,7 @@ const weft_command *const weft_commands[] = {
     &weft_cmd_layout,
     &weft_cmd_batch,
     &weft_cmd_compare,
+    &weft_cmd_lint,
     &weft_cmd_weave,
     &weft_cmd_bake,
     &weft_cmd_preview,

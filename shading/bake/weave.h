@@ -32,11 +32,10 @@ weft_err weft_weave_find(const weft_image *normal, const weft_image *albedo, wef
 
 /** How a seam came out. */
 typedef struct weft_seam {
-    double across[2]; /* mean change of albedo and slopes over the seams: right to left, bottom to top */
-    double inside[2]; /* the largest mean change between two neighbouring columns or rows inside */
-    double
-        repetition; /* what gives a tile away from afar: rms of the albedo's low frequencies over its mean */
-    int threads[2]; /* of the tile */
+    double across[2];  /* mean change of albedo and slopes over the seams: right to left, bottom to top */
+    double inside[2];  /* the largest mean change between two neighbouring columns or rows inside */
+    double repetition; /* rms of the repeats' mean albedo over the mean: what the eye finds in every tile */
+    int threads[2];    /* of the tile */
 } weft_seam;
 
 /**

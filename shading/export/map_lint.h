@@ -1,0 +1,37 @@
+/** What is wrong with anybody's maps: checks of single pictures, each with a figure and a remedy. */
+#ifndef WEFT_SHADING_EXPORT_MAP_LINT_H
+#define WEFT_SHADING_EXPORT_MAP_LINT_H
+
+#include "core/image.h"
+
+typedef enum weft_lint_level { WEFT_LINT_GOOD, WEFT_LINT_NOTE, WEFT_LINT_WRONG } weft_lint_level;
+
+/** One finding; called once for each check, good ones too. */
+typedef void weft_lint_fn(void *context, weft_lint_level level, const char *check, const char *text);
+
+typedef struct weft_lint {
+    weft_lint_fn *fn;
+    void *context;
+} weft_lint;
+
+/**
+ * Normals (3 planes, decoded to -1..1): unit length within the step of 8 bits, none behind the surface, and
+ * whether green grows upwards: slopes of a surface have no curl, so the sign with the smaller curl is the
+ * right one; a map that tells nothing (ratio under 1.2) is said so.
+ */
+void weft_lint_normal(const weft_lint *lint, const weft_image *normal);
+
+/**
+ * Albedo (1 or 3 planes, linear): measured charts lie between 3 % (black patch) and 90 % (white patch); what
+ * is outside is light or shadow left in the picture, or a wrong transfer curve.
+ */
+void weft_lint_albedo(const weft_lint *lint, const weft_image *albedo);
+
+/** Any picture: finite; its size; whether it repeats (the step over its edges against those inside). */
+void weft_lint_picture(const weft_lint *lint, const weft_image *image);
+
+/** Roughness or occlusion (values 0..1): not constant where a map was made of it, not black or white all
+ * over. */
+void weft_lint_scalar(const weft_lint *lint, const weft_image *image);
+
+#endif
