@@ -16,6 +16,9 @@ static const weft_board board = {9, 6, 10};
 
 enum { CORNERS = 54, MAX_VIEWS = 16 };
 
+/* What needs no choice of model does not pay for one. */
+static const weft_lens_options plain = {WEFT_LENS_K1K2P1P2, 0};
+
 typedef struct views {
     int n;
     weft_board_view views[MAX_VIEWS];
@@ -135,7 +138,7 @@ static void test_a_blurred_view_is_left_out(void **state)
         all.views[i].edge_px = i == 6 ? 9 : 2.5;
     weft_camera camera;
     weft_lens_report report;
-    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err));
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, &plain, &camera, &report, err));
     assert_int_equal(report.n_used, 12);
     assert_true(all.views[6].blurred && !all.views[6].used && !all.views[5].blurred);
 }
@@ -192,7 +195,7 @@ static void test_a_wrong_view_is_left_out(void **state)
         all.corners[4][2 * i] += 4.0F * (float)((i % 9 - 4) * (i % 9 - 4)) / 16;
     weft_camera camera;
     weft_lens_report report;
-    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err));
+    assert_ok(weft_lens_fit(&board, 640, 480, all.views, all.n, &plain, &camera, &report, err));
     assert_int_equal(report.n_used, 12);
     for (int i = 0; i < all.n; i++)
         assert_int_equal(all.views[i].used, i != 4);
@@ -208,11 +211,11 @@ static void test_views_that_do_not_determine_a_lens(void **state)
     load_photographs(&all);
     weft_camera camera = {.width = 7};
     weft_lens_report report;
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, 4, NULL, &camera, &report, err), WEFT_ERR_NODATA,
-                 "4 views of the board; wanted 5 or more");
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, 4, &plain, &camera, &report, err),
+                 WEFT_ERR_NODATA, "4 views of the board; wanted 5 or more");
     for (int i = 1; i < all.n; i++) /* one picture thirteen times */
         memcpy(all.corners[i], all.corners[0], sizeof all.corners[0]);
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err),
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, &plain, &camera, &report, err),
                  WEFT_ERR_NODATA, "tilt the board");
     assert_int_equal(camera.width, 7);
 }
@@ -229,7 +232,7 @@ static void test_outliers_that_are_too_many_are_named(void **state)
             all.corners[v][i] += (float)(20 * (1 + v) * weft_test_gauss(&seed));
     weft_camera camera;
     weft_lens_report report;
-    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, NULL, &camera, &report, err),
+    assert_fails(weft_lens_fit(&board, 640, 480, all.views, all.n, &plain, &camera, &report, err),
                  WEFT_ERR_NODATA, "contradict the others (view-");
 }
 
