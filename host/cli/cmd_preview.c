@@ -19,6 +19,7 @@ typedef struct preview_args {
     weft_texts params, lamps;
     weft_numbers light, light_mm, crop, sky;
     int shape, area, sky_model, tone, sweep;
+    bool draft;
     weft_size size;
     double exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
@@ -159,6 +160,10 @@ static const weft_field fields[] = {
      .max = 120,
      .def = "0",
      .help = "field of view of the camera; 0 sees everything straight on"},
+    {.key = "draft",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(preview_args, draft),
+     .help = "one sample a pixel: quick, and right for materials, whose mips are filtered"},
     {.key = "match",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(preview_args, match),
@@ -302,6 +307,7 @@ static weft_err set_view(const preview_args *a, weft_preview_view *view, weft_er
     view->background = a->background;
     view->repeat = a->repeat;
     view->fov_deg = a->fov_deg;
+    view->draft = a->draft;
     return WEFT_OK;
 }
 

@@ -28,18 +28,42 @@ static double solid_angle(const weft_image *image, int row)
     return 2 * WEFT_PI / image->width * (top - bottom);
 }
 
-/* Bilinear; wraps across, stops at the poles. */
-static void look_at(const weft_image *image, const double d[3], double weight, double sum[3])
+/* atan2 to 1e-5 rad, a fraction of a hundredth of a texel: a fit of odd degree eleven on 0..1.
+ * Source: Abramowitz and Stegun 1964, 4.4.49 (truncated). */
+static double quick_atan2(double y, double x)
 {
-    const double u = (atan2(d[0], d[1]) / (2 * WEFT_PI) + 0.5) * image->width - 0.5;
-    const double v = acos(d[2] > 1 ? 1 : d[2] < -1 ? -1 : d[2]) / WEFT_PI * image->height - 0.5;
-    const double fu = floor(u), fv = floor(v), tu = u - fu, tv = v - fv;
-    const int x0 = ((int)fu + image->width) % image->width, x1 = (x0 + 1) % image->width;
-    const int last = image->height - 1;
-    const int y0 = fv < 0 ? 0 : (int)fv, y1 = fv + 1 > last ? last : (int)fv + 1;
+    const double ax = fabs(x), ay = fabs(y), large = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
+    const double t = large > 0 ? small / large : 0, t2 = t * t;
+    double a =
+        t *
+        (0.99997726 +
+         t2 * (-0.33262347 + t2 * (0.19354346 + t2 * (-0.11643287 + t2 * (0.05265332 - t2 * 0.01172120)))));
+    a = ay > ax ? WEFT_PI / 2 - a : a;
+    a = x < 0 ? WEFT_PI - a : a;
+    return y < 0 ? -a : a;
+}
+
+/* A direction's place on any panorama: shares of width and height. */
+typedef struct spot {
+    double across, down;
+} spot;
+
+static spot spot_of(const double d[3])
+{
+    return (spot){quick_atan2(d[0], d[1]) / (2 * WEFT_PI) + 0.5,
+                  quick_atan2(sqrt(d[0] * d[0] + d[1] * d[1]), d[2]) / WEFT_PI};
+}
+
+/* Bilinear; wraps across, stops at the poles. */
+static void look_at(const weft_image *image, spot at, double weight, double sum[3])
+{
+    const double u = at.across * image->width + image->width - 0.5, v = at.down * image->height - 0.5;
+    const int fu = (int)u, fv = v > 0 ? (int)v : 0, last = image->height - 1;
+    const double tu = u - fu, tv = v > 0 ? v - fv : 0;
+    const int x0 = fu % image->width, x1 = x0 + 1 < image->width ? x0 + 1 : 0;
+    const int y0 = fv < last ? fv : last, y1 = y0 < last ? y0 + 1 : last;
     for (int c = 0; c < 3; c++) {
-        const float *const a = weft_image_row(image, c, y0 > last ? last : y0);
-        const float *const b = weft_image_row(image, c, y1);
+        const float *const a = weft_image_row(image, c, y0), *const b = weft_image_row(image, c, y1);
         sum[c] += weight * ((1 - tv) * ((1 - tu) * (double)a[x0] + tu * (double)a[x1]) +
                             tv * ((1 - tu) * (double)b[x0] + tu * (double)b[x1]));
     }
@@ -155,9 +179,10 @@ static void filter_texel(const filter_job *job, const double n[3], double sum[3]
         double d[3];
         for (int c = 0; c < 3; c++)
             d[c] = l[0] * t[c] + l[1] * b[c] + l[2] * n[c];
-        look_at(&job->from->mips[(int)low], d, job->kernel->weight[i] * (1 - part), sum);
+        const spot at = spot_of(d);
+        look_at(&job->from->mips[(int)low], at, job->kernel->weight[i] * (1 - part), sum);
         if (part > 0)
-            look_at(&job->from->mips[(int)low + 1], d, job->kernel->weight[i] * part, sum);
+            look_at(&job->from->mips[(int)low + 1], at, job->kernel->weight[i] * part, sum);
     }
 }
 
@@ -238,16 +263,28 @@ weft_err weft_environment_paint_sky(weft_image *panorama, const weft_sky *sky, d
 
 void weft_environment_map_irradiance(const weft_environment_map *map, const double n[3], double e[3])
 {
-    for (int c = 0; c < 3; c++)
-        e[c] = weft_max(weft_sh_convolve(n, weft_sh_cosine, map->light[c]), 0);
+    /* sqrt(4 pi/(2 l + 1)) A_l of the clamped cosine: pi, 2 pi/3, pi/4 */
+    double basis[WEFT_SH_COUNT];
+    weft_sh_basis(n[0], n[1], n[2], basis);
+    for (int k = 0; k < WEFT_SH_COUNT; k++)
+        basis[k] *= k == 0 ? WEFT_PI : k < 4 ? 2 * WEFT_PI / 3 : WEFT_PI / 4;
+    for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int k = 0; k < WEFT_SH_COUNT; k++)
+            sum += map->light[c][k] * basis[k];
+        e[c] = weft_max(sum, 0);
+    }
 }
 
 void weft_environment_map_look(const weft_environment_map *map, const double direction[3], double roughness,
                                double radiance[3])
 {
-    const double last = WEFT_ENVIRONMENT_LEVELS - 1, at = fmin(fmax(roughness, 0), 1) * last;
-    const int level = at < last ? (int)at : WEFT_ENVIRONMENT_LEVELS - 2;
+    const double last = WEFT_ENVIRONMENT_LEVELS - 1,
+                 within = roughness > 0 ? (roughness < 1 ? roughness : 1) : 0;
+    const double level_at = within * last;
+    const int level = level_at < last ? (int)level_at : WEFT_ENVIRONMENT_LEVELS - 2;
+    const spot at = spot_of(direction);
     radiance[0] = radiance[1] = radiance[2] = 0;
-    look_at(&map->levels[level], direction, 1 - (at - level), radiance);
-    look_at(&map->levels[level + 1], direction, at - level, radiance);
+    look_at(&map->levels[level], at, 1 - (level_at - level), radiance);
+    look_at(&map->levels[level + 1], at, level_at - level, radiance);
 }

@@ -144,7 +144,14 @@ static void add_to_row(float *to, int width, int left, const double *sums, int n
 /* Adds a run of samples to the picture under a tent two pixels wide: along the line first. */
 static void splat_run(const render *r, const weft_preview_samples *s, int first, const splat_target *target)
 {
-    const int ss = r->setup->supersampling, begin = first + ss / 2; /* samples from the left neighbour on */
+    const int ss = r->setup->supersampling;
+    if (ss == 1) {
+        for (int c = 0; c < 3 && target->row[0] >= 0; c++)
+            for (int i = 0; i < s->n; i++)
+                weft_image_row(r->picture, c, target->row[0])[first + i] = (float)s->value[c][i];
+        return;
+    }
+    const int begin = first + ss / 2; /* samples from the left neighbour on */
     const int n_pixels = (begin + s->n - 1) / ss - begin / ss + 2;
     for (int c = 0; c < 3; c++) {
         double sums[WEFT_PREVIEW_RUN / 2 + 2] = {0};
@@ -290,6 +297,8 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
     WEFT_TRY(find_crop(surface, view, &setup.crop, err));
     set_ranges(&setup);
     weft_preview_setup_shape(&setup);
+    if (view->draft)
+        setup.supersampling = 1;
     WEFT_TRY(weft_image_init(&made, view->width, view->height, 3, err));
     const weft_err status =
         weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);

@@ -118,6 +118,7 @@ typedef struct weft_preview_view {
     double background;      /* linear grey, not exposed */
     double repeat;          /* sphere: how often the shorter side of the map fits half round; > 0 */
     weft_preview_crop crop; /* the part of the map that is shown; width 0: weft_preview_whole() */
+    bool draft;             /* one sample a pixel, at its middle: for maps filtered to the pixels' size */
     double fov_deg;         /* 0: orthographic; else the camera's field of view over the shorter side */
 } weft_preview_view;
 

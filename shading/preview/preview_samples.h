@@ -34,7 +34,7 @@ typedef struct weft_preview_setup {
     const weft_preview_surface *surface;
     const weft_preview_view *view;
     weft_preview_crop crop;
-    int supersampling;    /* samples along a side of a pixel; even */
+    int supersampling;    /* samples along a side of a pixel; even, or 1 */
     double texels_per_px; /* plane: map pixels an output pixel; sphere: at the pole */
     double radius_px;     /* sphere: of its outline, output pixels */
     double radius_texels; /* sphere: of the sphere, map pixels */

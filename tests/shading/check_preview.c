@@ -434,6 +434,26 @@ static void test_roll_and_drape(void **state)
     weft_image_fini(&picture);
 }
 
+/* One sample a pixel: the flat plane is the same, and each map pixel its own. */
+static void test_draft(void **state)
+{
+    (void)state;
+    weft_preview_surface surface = surface_of("lambert", 300, 40);
+    weft_preview_view view = view_of(300, 40, 0, 90);
+    weft_image albedo = constant_image(300, 40, 0.5, 0.5, 0.5), picture;
+    for (int x = 0; x < 300; x++)
+        weft_image_row(&albedo, 1, 20)[x] = (float)(x / 300.0);
+    view.draft = true;
+    assert_ok(weft_preview_set_map(&surface, "albedo", &albedo, err));
+    assert_ok(weft_preview_render(&surface, &view, &picture, err));
+    for (int x = 0; x < 300; x++) {
+        assert_near(pixel(&picture, 1, x, 20), x / 300.0, 1e-6);
+        assert_near(pixel(&picture, 1, x, 21), 0.5, 1e-6);
+    }
+    weft_image_fini(&picture);
+    weft_image_fini(&albedo);
+}
+
 static void test_tone_curves(void **state)
 {
     (void)state;
@@ -471,6 +491,7 @@ int main(void)
         cmocka_unit_test(test_representative_point),
         cmocka_unit_test(test_even_surroundings),
         cmocka_unit_test(test_roll_and_drape),
+        cmocka_unit_test(test_draft),
         cmocka_unit_test(test_tone_curves),
         cmocka_unit_test(test_refusals),
     };
