@@ -213,9 +213,17 @@ void weft_doctor_serial_line(weft_doctor *doctor, weft_doctor_result *result)
     }
     const unsigned damaged = s.crc_errors - first.crc_errors + (s.bad_replies - first.bad_replies);
     const unsigned lost = s.overruns - first.overruns, again = s.retries - first.retries;
-    const bool bad = damaged + lost + again > 0;
-    weft_doctor_say(result, bad ? WEFT_DOCTOR_FAILED : WEFT_DOCTOR_OK,
-                    bad ? "a shorter or better USB cable, away from the LEDs' supply; no hub between" : NULL,
+    const bool bad = damaged + lost > 0 || again >= N_QUESTIONS / 50;
+    const bool late =
+        !bad && again > 0; /* one answer that came late: a busy computer more likely than a cable */
+    weft_doctor_say(result,
+                    bad    ? WEFT_DOCTOR_FAILED
+                    : late ? WEFT_DOCTOR_WARNING
+                           : WEFT_DOCTOR_OK,
+                    bad ? "a shorter or better USB cable, away from the LEDs' supply; no hub between"
+                    : late
+                        ? "run it again while the computer does nothing else; if it stays, another USB cable"
+                        : NULL,
                     "%d questions: %u damaged, %u bytes lost, %u asked again; answers in %.2f ms (median), "
                     "%.2f ms (99 %%)",
                     N_QUESTIONS, damaged, lost, again, ms[N_QUESTIONS / 2], ms[N_QUESTIONS * 99 / 100]);

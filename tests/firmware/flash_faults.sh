@@ -12,7 +12,7 @@ mute=$!
 # The old bootloader; firmware of another protocol is no obstacle; --json.
 board nano "$programs/firmware-of-protocol-2.elf" "$old_boot"
 expect 1 'speaks protocol 2' "$weft" light status --port "$pty"
-expect 0 '"before":null' "$weft" flash --port "$pty" --baud 57600 --json
+expect 0 '"before":null' patiently "$weft" flash --port "$pty" --baud 57600 --json
 [ "$(jq -r .now.firmware out)" != null ] || die "not one JSON object: $(cat out)"
 
 # Another processor.
@@ -69,7 +69,7 @@ mkdir -p inst/bin inst/share/weft
 cp "$weft" inst/bin/weft
 expect 1 'the firmware image is not there' inst/bin/weft flash --port "$pty"
 cp "$image" inst/share/weft/weft-firmware.hex
-expect 0 "image     $work/inst/share/weft/weft-firmware.hex" inst/bin/weft flash --port "$pty"
+expect 0 "image     $work/inst/share/weft/weft-firmware.hex" patiently inst/bin/weft flash --port "$pty"
 also 'settings  kept'
 
 wait $mute && die "a mute board was flashed"

@@ -38,6 +38,18 @@ tell() {
     echo "$@" >&"${!name}"
 }
 
+# patiently COMMAND...: on a machine with far more work than processors a bootloader gives up, as it should, before
+# avrdude has its turn; then again, as weft flash says.  Elsewhere once.
+patiently() {
+    local status=0 tries=1
+    until "$@"; do
+        status=$?
+        awk -v n="$(nproc)" '{ exit !($1 > 1.5 * n) }' /proc/loadavg || return $status
+        [ $tries -lt 5 ] || return $status
+        tries=$((tries + 1))
+    done
+}
+
 # starts flashing $pty in the background and waits until avrdude writes
 flash_until_writing() {
     "$weft" flash --port "$pty" -v >flash.out 2>flash.err &
