@@ -7,6 +7,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/solve/albedo_gamut.h"
+#include "host/solve/finish.h"
 #include "host/solve/solve.h"
 
 #include <string.h>
@@ -14,6 +15,8 @@
 typedef struct solve_args {
     const char *calibration, *output, *method, *explain_plot;
     weft_numbers explain;
+    double flatten_mm;
+    int height;
     int geometry, resolution, gloss, bounce;
     double mm_per_px, thickness_mm, shadow, memory_gib;
 } solve_args;
@@ -99,6 +102,22 @@ static const weft_field fields[] = {
      .max = 0.9,
      .def = "0",
      .help = "leave out samples below this part of the pixel's brightest one"},
+    {.key = "height",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(solve_args, height),
+     .choices = "off|poisson|relax",
+     .def = "off",
+     .help =
+         "also write height.exr in mm: poisson: the whole picture at once, weighted by confidence; relax: on "
+         "ever coarser grids, as if the picture repeated"},
+    {.key = "flatten",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(solve_args, flatten_mm),
+     .unit = "mm",
+     .min = 0,
+     .max = 10000,
+     .def = "0",
+     .help = "take bends longer than this off the normals, for detail maps; 0: leave them"},
     {.key = "explain",
      .type = WEFT_FIELD_F64S,
      .offset = offsetof(solve_args, explain),
@@ -230,6 +249,12 @@ static weft_err solve_one(const weft_invocation *inv, const solve_args *args, in
         status = weft_set_load(inv->operands[i], &set, err);
     if (status == WEFT_OK)
         status = weft_solve_set(&set, cal, args->calibration, options, &maps, err);
+    if (status == WEFT_OK && args->flatten_mm > 0) {
+        status = weft_maps_flatten(&maps, args->flatten_mm, err);
+        json_object_set_new(json_object_get(maps.info, "options"), "flatten_mm", json_real(args->flatten_mm));
+    }
+    if (status == WEFT_OK)
+        status = weft_maps_integrate(&maps, (weft_height_how)args->height, err);
     if (status == WEFT_OK)
         status = weft_maps_save(path, &maps, inv->force, err);
     if (status == WEFT_OK) {

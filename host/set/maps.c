@@ -25,6 +25,7 @@ void weft_maps_fini(weft_maps *maps)
     weft_image_fini(&maps->residual);
     weft_image_fini(&maps->confidence);
     weft_image_fini(&maps->uncertainty);
+    weft_image_fini(&maps->height_mm);
     weft_mask_fini(&maps->lights);
     weft_mask_fini(&maps->quality);
     weft_mask_fini(&maps->mask);
@@ -140,6 +141,11 @@ static weft_err write_confidence_exr(const char *path, const weft_maps *maps, we
     return weft_exr_write(path, &maps->confidence, grey_names, WEFT_EXR_HALF, err);
 }
 
+static weft_err write_height_exr(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_exr_write(path, &maps->height_mm, grey_names, WEFT_EXR_FLOAT, err);
+}
+
 static weft_err write_uncertainty_exr(const char *path, const weft_maps *maps, weft_error *err)
 {
     return weft_exr_write(path, &maps->uncertainty, grey_names, WEFT_EXR_HALF, err);
@@ -184,6 +190,7 @@ static weft_err write_all(const char *folder, const weft_maps *maps, weft_error 
         {maps->residual.planes != 0, "residual.exr", write_residual_exr},
         {maps->confidence.planes != 0, "confidence.exr", write_confidence_exr},
         {maps->uncertainty.planes != 0, "uncertainty.exr", write_uncertainty_exr},
+        {maps->height_mm.planes != 0, "height.exr", write_height_exr},
         {maps->lights.data != NULL, "lights.png", write_lights_png},
         {maps->quality.data != NULL, "quality.png", write_quality_png},
         {maps->mask.data != NULL, "mask.png", write_mask_png},

@@ -22,11 +22,13 @@ typedef struct weft_maps {
     weft_image residual;    /* 1 plane; planes 0 when absent */
     weft_image confidence;  /* 1 plane 0..1; planes 0 when absent */
     weft_image uncertainty; /* 1 plane: expected error of the normal, rms, degrees; planes 0 when absent */
-    weft_mask lights;       /* lights that each answer rests on; data NULL when absent */
-    weft_mask quality;      /* bits of docs/formats.md; data NULL when absent */
-    weft_mask mask;         /* 255 where there is an answer; data NULL: everywhere */
-    bool albedo_is_srgb;    /* linear sRGB (colour calibrated), else camera RGB */
-    json_t *info; /* inputs with hashes, options, version, timings: goes into maps.json; may be NULL */
+    weft_image
+        height_mm; /* 1 plane: height of the surface, mean 0, mm; planes 0 when absent; written, not read */
+    weft_mask lights;    /* lights that each answer rests on; data NULL when absent */
+    weft_mask quality;   /* bits of docs/formats.md; data NULL when absent */
+    weft_mask mask;      /* 255 where there is an answer; data NULL: everywhere */
+    bool albedo_is_srgb; /* linear sRGB (colour calibrated), else camera RGB */
+    json_t *info;        /* inputs with hashes, options, version, timings: goes into maps.json; may be NULL */
 } weft_maps;
 
 void weft_maps_fini(weft_maps *maps);
