@@ -2,8 +2,13 @@
 #include "tests/support/support.h"
 
 #include "shading/brdf/albedo.h"
+#include "shading/brdf/beckmann.h"
+#include "shading/brdf/charlie.h"
+#include "shading/brdf/cloth.h"
+#include "shading/brdf/ggx.h"
 #include "shading/brdf/half_vector.h"
 #include "shading/brdf/log_positive.h"
+#include "shading/brdf/quadrature.h"
 #include "shading/brdf/sampling.h"
 
 #include <math.h>
@@ -293,6 +298,70 @@ static double chi_square_score(double expected[RINGS][SECTORS], double counted[R
     return (sum - (cells - 1)) / sqrt(2.0 * (cells - 1));
 }
 
+/* The normal distributions behind the models; x is |n x h|^2. */
+static double ndf_ggx(double nh, double x, double alpha)
+{
+    return weft_ggx_d(nh, x, alpha);
+}
+
+static double ndf_beckmann(double nh, double x, double alpha)
+{
+    return weft_beckmann_d(nh, x, alpha);
+}
+
+static double ndf_cloth(double nh, double x, double alpha)
+{
+    return weft_cloth_d(nh, x, alpha, 4);
+}
+
+static double ndf_charlie(double nh, double x, double alpha)
+{
+    (void)nh;
+    return weft_charlie_d(x, alpha);
+}
+
+/* integral of D (n.h) over the hemisphere is pi times that of D over x; cut at decades of x and of 1 - x, for
+ * lobes may be narrow at either end. */
+static double ndf_integral(double (*d)(double nh, double x, double alpha), double alpha)
+{
+    enum { DECADES = 12 };
+    weft_quadrature q;
+    double sum = 0;
+    weft_quadrature_init(&q, 16);
+    for (int part = 0; part < 2 * DECADES + 2; part++) {
+        const int k = part / 2;
+        const double high = 0.5 * pow(10, -k), low = k < DECADES ? 0.1 * high : 0;
+        for (int i = 0; i < q.n; i++) {
+            const double t = low + (high - low) * q.at[i], x = part % 2 ? 1 - t : t;
+            const double nh2 = part % 2 ? t : 1 - t;
+            sum += WEFT_PI * (high - low) * q.weight[i] * d(sqrt(nh2), x, alpha);
+        }
+    }
+    return sum;
+}
+
+static void test_normal_distributions_integrate_to_one(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        double (*d)(double nh, double x, double alpha);
+        double least; /* of alpha */
+    } rows[] = {{"ggx", ndf_ggx, 1e-4},
+                {"beckmann", ndf_beckmann, 1e-4},
+                {"cloth", ndf_cloth, 1e-4},
+                {"charlie", ndf_charlie, 0.1}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        double worst = 0;
+        for (int k = 0; k <= 20; k++) {
+            const double alpha = pow(rows[i].least, 1 - k / 20.0);
+            worst = fmax(worst, fabs(ndf_integral(rows[i].d, alpha) - 1));
+        }
+        print_message("  %-18s largest |integral of D cos - 1| %.2e\n", rows[i].name, worst);
+        assert_near(worst, 0, 1e-6);
+    }
+}
+
 static void test_samples_follow_the_density(void **state)
 {
     (void)state;
@@ -399,6 +468,7 @@ int main(void)
         cmocka_unit_test(test_arrays_give_what_single_evaluations_give),
         cmocka_unit_test(test_furnace),
         cmocka_unit_test(test_density_integrates_to_one),
+        cmocka_unit_test(test_normal_distributions_integrate_to_one),
         cmocka_unit_test(test_samples_follow_the_density),
         cmocka_unit_test(test_logarithm_and_exponential),
         cmocka_unit_test(test_albedos_known_from_elsewhere),
