@@ -51,8 +51,8 @@ static weft_err plot_lobes(const weft_brdf *brdf, const double *values, const ch
                                       .legend_rows = 1,
                                       .standalone = true},
                     &out);
-    for (double share = 1; share > 1e-3; share /= 10)
-        weft_plot_circle(&plot, 7, 0, 0, cbrt(share));
+    for (int decade = 0; decade < 4; decade++)
+        weft_plot_circle(&plot, 7, 0, 0, cbrt(pow(10, -decade)));
     for (int k = 0; k < N_LOBES; k++) {
         double x[LOBE_POINTS], y[LOBE_POINTS];
         const double view = lobe_deg[k] * WEFT_PI / 180;
