@@ -108,8 +108,8 @@ static const weft_field fields[] = {
      .choices = "off|poisson|relax",
      .def = "off",
      .help =
-         "also write height.exr in mm: poisson: the whole picture at once, weighted by confidence; relax: on "
-         "ever coarser grids, as if the picture repeated"},
+         "also write height.exr in mm: poisson, weighted by confidence; relax: as if the picture repeated, "
+         "by relaxation, for comparison (minutes)"},
     {.key = "flatten",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, flatten_mm),
