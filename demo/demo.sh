@@ -37,7 +37,7 @@ tell() { "$weft" rig --dir "$out/rig" --tell "$1"; }
 start_rig() {
     "$weft" rig --dir "$out/rig" --seed 1 >"$out/rig.log" 2>&1 &
     rig_pid=$!
-    for _ in $(seq 100); do
+    for _ in $(seq 600); do
         [ -f "$out/rig/rig.json" ] && return
         kill -0 "$rig_pid" 2>/dev/null || { cat "$out/rig.log"; return 1; }
         sleep 0.1
