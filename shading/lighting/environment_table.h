@@ -28,7 +28,7 @@ void weft_environment_table_compute(weft_environment_table *table, weft_environm
 void weft_environment_table_get(weft_environment_table *table, weft_environment_lobe lobe);
 
 /** Bicubic (Catmull-Rom) value, within 5e-4 of the integral for n.v >= WEFT_ENVIRONMENT_MIN_NV and
- *  alpha >= 1e-3. */
+ *  alpha >= 3.4e-3; within 2.6e-3 where both are near 1e-3. */
 weft_environment_share weft_environment_table_at(const weft_environment_table *table, double nv,
                                                  double alpha);
 
