@@ -165,18 +165,25 @@ static weft_err plan_item(const weft_batch *batch, weft_batch_item *item, weft_e
     return WEFT_OK;
 }
 
-/* Maps that this batch has not made, or made of other inputs or with other options. */
-static weft_err refuse_foreign(const weft_batch *batch, const weft_batch_item *item, weft_error *err)
+/* Maps that this batch has not made, or made of other inputs or with other options.  A task of an earlier run
+ * may put maps in place while this one plans: what is there now is looked at once more before it is called
+ * foreign. */
+static weft_err refuse_foreign(const weft_batch *batch, weft_batch_item *item, weft_error *err)
 {
     char *const maps = weft_batch_maps_path(batch, item->name, err);
     if (!maps)
         return WEFT_ERR_NOMEM;
     weft_err status = WEFT_OK;
-    if (item->state == WEFT_BATCH_WAITING && !batch->force && weft_folder_exists(maps))
-        status = weft_fail(err, WEFT_ERR_EXISTS,
-                           "%s was made of other inputs, with other options or by another command: give "
-                           "another folder, or --force to replace it",
-                           maps);
+    if (item->state == WEFT_BATCH_WAITING && !batch->force && weft_folder_exists(maps)) {
+        weft_batch_look(batch, item);
+        if (item->state == WEFT_BATCH_SOLVED)
+            item->state = WEFT_BATCH_KEPT;
+        else
+            status = weft_fail(err, WEFT_ERR_EXISTS,
+                               "%s was made of other inputs, with other options or by another command: give "
+                               "another folder, or --force to replace it",
+                               maps);
+    }
     weft_free(maps);
     return status;
 }
