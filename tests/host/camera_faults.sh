@@ -38,7 +38,13 @@ if [ -n "${WEFT_ALL_FAULTS:-}" ]; then
 fi
 for ratio in "${ratios[@]}"; do
     tell "camera lost $ratio" >/dev/null
-    expect 0 '"frames":11' "${capture[@]}" --camera aravis:127.0.0.1,packet=1400 "$dir/loss-$ratio.set" --json
+    # three in ten of these frames lose a packet at 0.001: a light may fail its three tries, the set is then resumed
+    again=()
+    for _ in 1 2 3 4 5 6; do
+        "${capture[@]}" --camera aravis:127.0.0.1,packet=1400 "$dir/loss-$ratio.set" "${again[@]}" 2>"$dir/err" && break
+        grep -q 'packets missing' "$dir/err" || fail "packet loss $ratio: $(cat "$dir/err")"
+        again=(--resume)
+    done
     check_files "$dir/loss-$ratio.set" complete 11
     row "packet loss $ratio"
 done
