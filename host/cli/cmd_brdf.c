@@ -5,14 +5,14 @@
 #include "core/csv.h"
 #include "core/file.h"
 #include "core/mem.h"
-#include "shading/brdf/brdf.h"
+#include "shading/brdf/merl.h"
 #include "shading/vectors/vectors_tables.h"
 
 #include <math.h>
 #include <string.h>
 
 typedef struct brdf_args {
-    const char *eval, *plot;
+    const char *eval, *plot, *merl;
     weft_texts params;
     bool furnace, reciprocity;
 } brdf_args;
@@ -28,6 +28,11 @@ static const weft_field fields[] = {
      .offset = offsetof(brdf_args, plot),
      .unit = "FILE",
      .help = "draw it: NAME.svg lobes in the plane of incidence, NAME.png or .exr a slice over half angles"},
+    {.key = "merl",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(brdf_args, merl),
+     .unit = "FILE.binary",
+     .help = "write it as a table of the MERL database's form: 90 x 90 x 180 cells, 35 MB"},
     {.key = "furnace",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(brdf_args, furnace),
@@ -72,15 +77,14 @@ static json_t *model_json(const weft_brdf *brdf)
 
 static weft_err list_models(const weft_invocation *inv, const weft_brdf *only, weft_error *err)
 {
+    const weft_brdf *const one[] = {only, NULL};
     json_t *const models = json_array();
-    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
-        if (only && *b != only)
-            continue;
+    for (const weft_brdf *const *b = only ? one : weft_brdfs; *b; b++) {
         if (inv->json)
             json_array_append_new(models, model_json(*b));
         else
             print_model(inv, *b);
-        if (!inv->json && !only && b[1])
+        if (!inv->json && b[1])
             fputc('\n', inv->out);
     }
     if (inv->json)
@@ -201,57 +205,78 @@ static weft_err print_proofs(const weft_invocation *inv, const brdf_args *a, con
     return WEFT_OK;
 }
 
-/* --plot, --furnace, --reciprocity. */
-static weft_err examine(const weft_invocation *inv, const brdf_args *a, const char *name, weft_error *err)
+/* What is said about the files that were written. */
+static weft_err print_files(const weft_invocation *inv, const brdf_args *a, const weft_brdf *brdf,
+                            weft_error *err)
 {
-    const weft_brdf *brdf;
+    if (inv->json)
+        return weft_print_json(
+            inv, json_pack("{s:s, s:s*, s:s*}", "model", brdf->name, "plot", a->plot, "merl", a->merl), err);
+    if (a->plot)
+        fprintf(inv->out, "%s: %s\n", a->plot, brdf->name);
+    if (a->merl)
+        fprintf(inv->out, "%s: %s\n", a->merl, brdf->name);
+    return WEFT_OK;
+}
+
+/* --plot, --merl, --furnace, --reciprocity. */
+static weft_err examine(const weft_invocation *inv, const brdf_args *a, const weft_brdf *brdf,
+                        weft_error *err)
+{
     double values[WEFT_BRDF_MAX_PLANES];
-    if (!name || a->eval)
-        return weft_fail(err, WEFT_ERR_USAGE,
-                         "--plot, --furnace and --reciprocity want the NAME of a model%s",
-                         a->eval ? ", and no --eval" : "");
-    WEFT_TRY(weft_brdf_find(name, &brdf, err));
     weft_brdf_defaults(brdf, values);
     for (int i = 0; i < a->params.n; i++)
         WEFT_TRY(weft_brdf_set(brdf, a->params.values[i], values, err));
-    if (a->plot) {
+    if (a->plot)
         WEFT_TRY(weft_file_refuse_existing(a->plot, inv->force, err));
+    if (a->merl && !weft_path_has_suffix(a->merl, ".binary"))
+        return weft_fail(err, WEFT_ERR_USAGE, "--merl wants NAME.binary, not %s", a->merl);
+    if (a->merl)
+        WEFT_TRY(weft_file_refuse_existing(a->merl, inv->force, err));
+    if (a->plot)
         WEFT_TRY(weft_brdf_plot(brdf, values, a->plot, err));
-    }
-    if (a->furnace || a->reciprocity)
-        return print_proofs(inv, a, brdf, values, err);
+    if (a->merl)
+        WEFT_TRY(weft_merl_write(a->merl, brdf, values, err));
+    return a->furnace || a->reciprocity ? print_proofs(inv, a, brdf, values, err)
+                                        : print_files(inv, a, brdf, err);
+}
+
+static weft_err eval(const weft_invocation *inv, const brdf_args *a, const weft_vectors_model *function,
+                     const weft_brdf *brdf, weft_error *err)
+{
+    weft_csv csv;
     if (inv->json)
-        return weft_print_json(inv, json_pack("{s:s, s:s}", "model", name, "plot", a->plot), err);
-    fprintf(inv->out, "%s: %s\n", a->plot, name);
-    return WEFT_OK;
+        return weft_fail(err, WEFT_ERR_USAGE, "--eval prints a table; it has no --json");
+    if (function && a->params.n)
+        return weft_fail(err, WEFT_ERR_USAGE, "%s takes all its inputs from the table, no --param",
+                         inv->operands[0]);
+    WEFT_TRY(weft_csv_read(a->eval, &csv, err));
+    const weft_err status = function ? eval_function(inv, function, &csv, a->eval, err)
+                                     : eval_model(inv, brdf, &a->params, &csv, a->eval, err);
+    weft_csv_fini(&csv);
+    return status;
 }
 
 static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
 {
     const brdf_args *const a = args;
     const char *const name = inv->n_operands ? inv->operands[0] : NULL;
-    const weft_brdf *brdf = NULL;
-    if (a->plot || a->furnace || a->reciprocity)
-        return examine(inv, a, name, err);
-    if (!a->eval) {
-        if (name)
-            WEFT_TRY(weft_brdf_find(name, &brdf, err));
-        return list_models(inv, brdf, err);
-    }
-    if (!name)
+    const bool examines = a->plot || a->merl || a->furnace || a->reciprocity;
+    if (examines && (!name || a->eval))
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--plot, --merl, --furnace and --reciprocity want the NAME of a model%s",
+                         a->eval ? ", and no --eval" : "");
+    if (a->eval && !name)
         return weft_fail(err, WEFT_ERR_USAGE, "--eval wants the NAME of a model too");
-    if (inv->json)
-        return weft_fail(err, WEFT_ERR_USAGE, "--eval prints a table; it has no --json");
-    const weft_vectors_model *const function = weft_vectors_find(name);
-    if (!function)
-        WEFT_TRY(weft_brdf_find(name, &brdf, err));
-    else if (a->params.n)
-        return weft_fail(err, WEFT_ERR_USAGE, "%s takes all its inputs from the table, no --param", name);
-    weft_csv csv;
-    WEFT_TRY(weft_csv_read(a->eval, &csv, err));
-    const weft_err status = function ? eval_function(inv, function, &csv, a->eval, err)
-                                     : eval_model(inv, brdf, &a->params, &csv, a->eval, err);
-    weft_csv_fini(&csv);
+    const weft_vectors_model *const function = a->eval ? weft_vectors_find(name) : NULL;
+    const weft_brdf *brdf = NULL;
+    weft_merl *loaded = NULL;
+    if (name && !function)
+        WEFT_TRY(weft_brdf_open(name, &loaded, &brdf, err));
+    const weft_err status = a->eval    ? eval(inv, a, function, brdf, err)
+                            : examines ? examine(inv, a, brdf, err)
+                                       : list_models(inv, brdf, err);
+    weft_merl_destroy(loaded);
     return status;
 }
 
@@ -271,7 +296,8 @@ const weft_command weft_cmd_brdf = {
         "name, a colour also as name_r, name_g, name_b.  Columns out_*, tag and note are passed through.  "
         "The\n"
         "value (1/sr, without the cosine) is appended with 17 digits.  NAME may also be that of a table of\n"
-        "reference values, such as ord_ggx_terms or cloth_albedo.",
+        "reference values, such as ord_ggx_terms or cloth_albedo, or a file NAME.binary of measured\n"
+        "reflectance in the form of the MERL database, as --merl writes it.",
     .example = "weft brdf ggx --eval angles.csv --param alpha=0.3 --param f0=0.04",
     .run = run,
 };

@@ -49,7 +49,7 @@ static weft_err make_surface(weft_preview_input *input, const char *folder, cons
         .normal = maps->normal.planes ? &maps->normal : NULL,
         .mask = maps->mask.data ? &maps->mask : NULL,
     };
-    WEFT_TRY(weft_brdf_find(brdf, &input->surface.brdf, err));
+    WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     if (maps->albedo.planes && weft_brdf_find_param(input->surface.brdf, "albedo", NULL))
         WEFT_TRY(weft_preview_set_map(&input->surface, "albedo", &maps->albedo, err));
@@ -115,7 +115,7 @@ static weft_err load_material(weft_preview_input *input, const char *folder, con
                               weft_error *err)
 {
     WEFT_TRY(weft_material_load(folder, &input->baked, err));
-    WEFT_TRY(weft_brdf_find(brdf, &input->surface.brdf, err));
+    WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     return use_level(input, 0, err);
 }
@@ -126,7 +126,7 @@ static weft_err make_even(weft_preview_input *input, const char *brdf, weft_erro
     const double mm_per_px = 50 * WEFT_PI / SIDE, corner = 0.5 * (SIDE - 1) * mm_per_px;
     input->surface = (weft_preview_surface){
         .width = SIDE, .height = SIDE, .mm_per_px = mm_per_px, .origin_mm = {-corner, corner}};
-    WEFT_TRY(weft_brdf_find(brdf, &input->surface.brdf, err));
+    WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     for (int i = 0; i < input->params.n; i++)
         WEFT_TRY(set_param(input, input->params.values[i], err));
@@ -180,6 +180,7 @@ void weft_preview_input_fini(weft_preview_input *input)
         weft_image_fini(&input->extra[i]);
     weft_maps_fini(&input->maps);
     weft_baked_fini(&input->baked);
+    weft_merl_destroy(input->measured);
     *input = (weft_preview_input){0};
 }
 

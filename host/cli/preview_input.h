@@ -5,12 +5,14 @@
 #include "core/fields.h"
 #include "host/set/maps.h"
 #include "shading/bake/baked.h"
+#include "shading/brdf/merl.h"
 #include "shading/preview/preview.h"
 
 /** What is looked at in memory, and the surface that borrows it. */
 typedef struct weft_preview_input {
-    weft_maps maps;   /* of a maps folder */
-    weft_baked baked; /* of a material */
+    weft_maps maps;      /* of a maps folder */
+    weft_baked baked;    /* of a material */
+    weft_merl *measured; /* of a model that is a file */
     weft_texts params;
     int n_extra;
     weft_image extra[WEFT_TEXTS_MAX]; /* maps of parameters: --param alpha=roughness.exr */
@@ -20,6 +22,7 @@ typedef struct weft_preview_input {
 /**
  * Loads solved maps (NAME.maps) or a baked material (NAME.material) for a model.
  *
+ * @param brdf    name of a model, or NAME.binary: a table of the MERL form
  * @param folder  NULL: a smooth even surface of the model's parameters, a ball of which has a radius of 50 mm
  * @param params  "name=0.3", "name=r,g,b", or "name=FILE" (EXR, or PNG/TIFF as linear 0..1) of the same size
  * The albedo map becomes the parameter "albedo" where the model has one; a material also gives "f0" (from

@@ -192,6 +192,7 @@ static void spread(spread_model *model, const weft_brdf *brdf, const double valu
 static weft_brdf_batch with_params(const spread_model *model, const weft_brdf_batch *batch)
 {
     weft_brdf_batch full = *batch;
+    full.data = model->brdf->data;
     for (int k = 0; k < weft_brdf_n_planes(model->brdf); k++)
         full.param[k] = model->planes[k];
     return full;

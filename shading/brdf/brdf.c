@@ -17,7 +17,8 @@ weft_err weft_brdf_find(const char *name, const weft_brdf **brdf, weft_error *er
         const int n = snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "", (*b)->name);
         used += n > 0 && used + (size_t)n < sizeof names ? (size_t)n : 0;
     }
-    return weft_fail(err, WEFT_ERR_USAGE, "%s: no such BRDF; there are %s", name, names);
+    return weft_fail(err, WEFT_ERR_USAGE, "%s: no such BRDF; there are %s, and tables NAME.binary", name,
+                     names);
 }
 
 int weft_brdf_n_planes(const weft_brdf *brdf)
@@ -105,7 +106,7 @@ weft_err weft_brdf_set(const weft_brdf *brdf, const char *text, double values[WE
 void weft_brdf_eval_one(const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES],
                         const double light[3], const double view[3], double value[3])
 {
-    weft_brdf_batch batch = {.n = 1};
+    weft_brdf_batch batch = {.n = 1, .data = brdf->data};
     double *const out[3] = {&value[0], &value[1], &value[2]};
     for (int c = 0; c < 3; c++) {
         batch.light[c] = &light[c];

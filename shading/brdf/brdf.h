@@ -45,6 +45,7 @@ typedef struct weft_brdf_batch {
     const double *light[3];                    /* [3][n]; not read by sample */
     const double *view[3];                     /* [3][n] */
     const double *param[WEFT_BRDF_MAX_PLANES]; /* [weft_brdf_n_planes()][n], in the order of the rows */
+    const void *data;                          /* the model's own */
 } weft_brdf_batch;
 
 typedef struct weft_brdf {
@@ -53,6 +54,7 @@ typedef struct weft_brdf {
     const char *source;  /* paper, equation, S- id */
     unsigned flags;
     const weft_brdf_param *params;
+    const void *data; /* what a measured model reads (merl.h); callers put it into each batch.  NULL */
 
     /** Writes f [3][n], 1/sr.  Never NaN, infinite or negative for unit vectors and parameters in range. */
     void (*eval)(const weft_brdf_batch *batch, double *const value[3]);

@@ -96,7 +96,8 @@ void weft_preview_eval(const weft_preview_setup *setup, weft_preview_samples *s,
 {
     weft_brdf_batch batch = {.n = s->n,
                              .light = {s->light[0], s->light[1], s->light[2]},
-                             .view = {s->view[0], s->view[1], s->view[2]}};
+                             .view = {s->view[0], s->view[1], s->view[2]},
+                             .data = setup->surface->brdf->data};
     double *const to[3] = {value[0], value[1], value[2]};
     for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
         batch.param[k] = s->param[k];

@@ -77,7 +77,8 @@ static double baseline_rate(void)
 static double evaluation_rate(const weft_brdf *brdf)
 {
     static double light[3][RUN], view[3][RUN], params[WEFT_BRDF_MAX_PLANES][RUN], value[3][RUN];
-    weft_brdf_batch batch = {RUN, {light[0], light[1], light[2]}, {view[0], view[1], view[2]}, {0}};
+    weft_brdf_batch batch = {
+        .n = RUN, .light = {light[0], light[1], light[2]}, .view = {view[0], view[1], view[2]}};
     double *const out[3] = {value[0], value[1], value[2]};
     double defaults[WEFT_BRDF_MAX_PLANES], best = 0;
     weft_brdf_defaults(brdf, defaults);

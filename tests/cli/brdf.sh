@@ -54,3 +54,28 @@ import json, math, sys
 d = json.load(sys.stdin)
 assert abs(d["furnace"][-1]["albedo"][2] - (1 - math.log(2))) < 1e-5 and d["largest_change"] < 1e-12, d'
 expect 0 'change f by' "$weft" brdf disney --reciprocity --furnace
+
+# a table of the MERL form: written, read as a model, the same furnace (of what 90 cells hold), looked at
+expect 0 'cloth.binary: cloth' "$weft" brdf cloth --merl cloth.binary -p albedo=0.8,0.4,0.2
+expect 1 'cloth.binary' "$weft" brdf cloth --merl cloth.binary
+expect 2 'wants NAME.binary' "$weft" brdf cloth --merl cloth.bin
+expect 2 'anisotropic' "$weft" brdf ggx-anisotropic --merl t.binary
+test ! -e t.binary
+expect 0 'over half and difference angles' "$weft" brdf cloth.binary
+"$weft" brdf cloth.binary --furnace --json >of-table
+"$weft" brdf cloth -p albedo=0.8,0.4,0.2 --furnace --json >of-model
+python3 -c '
+import json
+a, b = (json.load(open(f))["furnace"] for f in ("of-table", "of-model"))
+for x, y in zip(a, b):
+    assert max(abs(p - q) for p, q in zip(x["albedo"], y["albedo"])) < 2e-3, (x, y)'
+printf 'nl,nv,phi\n0.8,0.6,2\n' >"$work/t.csv"
+expect 0 '0.8,0.6,2,0.2' "$weft" brdf cloth.binary --eval "$work/t.csv"
+expect 0 'lobes' "$weft" brdf cloth.binary --plot merl-lobes.svg
+expect 0 'merl.png' "$weft" preview -o merl.png --brdf cloth.binary --shape sphere --size 64x64 --ambient 0
+expect 0 'model.png' "$weft" preview -o model.png --brdf cloth -p albedo=0.8,0.4,0.2 --shape sphere --size 64x64 --ambient 0
+"$weft" compare merl.png model.png --json | python3 -c 'import json, sys; assert json.load(sys.stdin)["psnr_db"] > 60'
+head -c 1000000 cloth.binary >cut.binary
+expect 1 'this file 1000000; copy it again' "$weft" brdf cut.binary --furnace
+expect 1 'cut.binary' "$weft" preview -o cut.png --brdf cut.binary --shape sphere
+test ! -e cut.png

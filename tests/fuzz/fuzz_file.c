@@ -12,6 +12,7 @@
 #include "core/mem.h"
 #include "host/set/import_list.h"
 #include "host/set/set.h"
+#include "shading/brdf/merl.h"
 #include "shading/material/asset.h"
 
 #include <stdint.h>
@@ -79,6 +80,17 @@ static void read_material(const char *path)
         for (int i = 0; weft_assets_get(assets, i); i++)
             weft_asset_print(weft_assets_get(assets, i), stdout);
     weft_assets_destroy(assets);
+}
+
+static void read_merl(const char *path)
+{
+    static const double up[3] = {0, 0, 1};
+    weft_merl *merl;
+    double f[3];
+    if (weft_merl_read(path, &merl, NULL) != WEFT_OK)
+        return;
+    weft_brdf_eval_one(&merl->brdf, NULL, up, up, f);
+    weft_merl_destroy(merl);
 }
 
 static void read_set(const char *path)
