@@ -5,6 +5,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/batch/batch.h"
+#include "host/daemon/job_kinds.h"
 
 #include <stdint.h>
 #include <string.h>
@@ -115,15 +116,17 @@ static weft_err solve_one(void *context, const char *set, const char *maps, weft
     return status;
 }
 
-/* A wrong option is known before the first set is looked at. */
+/* A wrong option is known before the first set is looked at; paths are the batch's own matter. */
 static weft_err check_solve_options(const batch_args *args, weft_error *err)
 {
-    static const char *const own[] = {"output", "calibration", "explain"};
+    const weft_job_kind *const kind = weft_job_kind_find("solve");
     solve_line line = {0};
-    for (int i = 0; i < args->solve.n; i++)
-        for (size_t k = 0; k < sizeof own / sizeof *own; k++)
-            if (strncmp(args->solve.values[i], own[k], strlen(own[k])) == 0)
-                return weft_fail(err, WEFT_ERR_USAGE, "--solve %s is not for batches", args->solve.values[i]);
+    for (int i = 0; i < args->solve.n; i++) {
+        char key[64];
+        snprintf(key, sizeof key, "%.*s", (int)strcspn(args->solve.values[i], "="), args->solve.values[i]);
+        if (weft_job_kind_is_path(kind, key) || strcmp(key, "explain") == 0)
+            return weft_fail(err, WEFT_ERR_USAGE, "--solve %s is not for batches", args->solve.values[i]);
+    }
     const weft_err status = parse_solve_line(args, "x", &line, err);
     solve_line_fini(&line);
     return status == WEFT_OK ? status : weft_prefix(err, status, "--solve");

@@ -22,11 +22,17 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "calibrate colour", .reads = "*|chart-photo|flat|cal", .writes = "output|overlay|patches", .texts = "chart|edition|exclude"},
     {.command = "import", .reads = "*", .writes = "output|cal"},
     {.command = "calibrate report", .reads = "*", .writes = "output"},
-    {.command = "solve", .reads = "*|calibration", .writes = "output", .texts = "method"},
+    {.command = "solve", .reads = "*|calibration", .writes = "output|explain-plot", .texts = "method"},
+    {.command = "check", .reads = "*|calibration|repeat", .writes = "map", .texts = "method"},
+    {.command = "layout", .reads = "*", .writes = "plot"},
+    {.command = "batch", .reads = "*|calibration", .writes = "output", .texts = "solve", .never = "sbatch|task"},
     {.command = "compare", .reads = "*|mask"},
+    {.command = "lint", .reads = "*"},
+    {.command = "weave", .reads = "*", .writes = "output|picture"},
+    {.command = "bake", .reads = "*|library", .writes = "output", .texts = "material|export", .never = "format"},
     {.command = "preview", .reads = "*|match|calibration|env", .writes = "output", .texts = "brdf|param|lamp|columns"},
     {.command = "contact", .reads = "*", .writes = "output", .texts = "brdf|param"},
-    {.command = "library reindex", .reads = "library"},
+    {.command = "library reindex", .reads = "library", .in_library = true},
     {0},
 };
 /* clang-format on */
@@ -49,6 +55,11 @@ bool weft_job_kind_lists(const char *list, const char *word)
         p += length + (p[length] == '|');
     }
     return false;
+}
+
+bool weft_job_kind_is_path(const weft_job_kind *kind, const char *option)
+{
+    return weft_job_kind_lists(kind->reads, option) || weft_job_kind_lists(kind->writes, option);
 }
 
 bool weft_job_kind_is_device(const char *option)

@@ -19,6 +19,8 @@ typedef struct weft_job_kind {
     const char *reads;  /* options that name what it reads, "a|b"; "*" stands for the operands; NULL none */
     const char *writes; /* the same of what it makes */
     const char *texts;  /* options with a text that is no path */
+    const char *never;  /* options that a job does not have: they would do what the daemon does not know of */
+    bool in_library;    /* its option --library is the daemon's, when the request names none */
 } weft_job_kind;
 
 /** Ends with a row whose command is NULL. */
@@ -29,6 +31,9 @@ const weft_job_kind *weft_job_kind_find(const char *command);
 
 /** Whether "a|b|c" has the word; false for NULL. */
 bool weft_job_kind_lists(const char *list, const char *word);
+
+/** Whether the row says that the option is a path. */
+bool weft_job_kind_is_path(const weft_job_kind *kind, const char *option);
 
 /** --rig, --port, --camera: the devices, which the daemon knows best. */
 bool weft_job_kind_is_device(const char *option);

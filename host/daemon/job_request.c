@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MAX_OPERANDS = 1000, MAX_OPTIONS = 100, MAX_TEXT = 4096 };
+enum { MAX_OPERANDS = 1000, MAX_OPTIONS = 100, MAX_TEXT = 4096, MAX_AFTER = 100 };
 
 typedef struct parse {
     const weft_job_rights *rights;
@@ -43,9 +43,9 @@ static weft_err check_keys(const json_t *request, weft_error *err)
     json_object_foreach((json_t *)(uintptr_t)request, key, value)
     {
         (void)value;
-        if (!weft_job_kind_lists("command|operands|options|format|hold", key))
+        if (!weft_job_kind_lists("command|operands|options|format|hold|after", key))
             return weft_fail(err, WEFT_ERR_USAGE,
-                             "\"%.40s\": a job has command, operands, options, format and hold", key);
+                             "\"%.40s\": a job has command, operands, options, format, hold and after", key);
     }
     return WEFT_OK;
 }
@@ -131,8 +131,8 @@ static bool list_to_text(const json_t *list, char text[MAX_TEXT + 2])
 
 static bool is_classified(const weft_job_kind *kind, const char *key)
 {
-    return weft_job_kind_lists(kind->reads, key) || weft_job_kind_lists(kind->writes, key) ||
-           weft_job_kind_lists(kind->texts, key) || weft_job_kind_is_device(key);
+    return weft_job_kind_is_path(kind, key) || weft_job_kind_lists(kind->texts, key) ||
+           weft_job_kind_is_device(key);
 }
 
 static weft_err take_option(parse *p, const char *key, const json_t *value, weft_error *err)
@@ -145,7 +145,8 @@ static weft_err take_option(parse *p, const char *key, const json_t *value, weft
     if (weft_job_kind_is_device(key) && !p->rights->own_user)
         return weft_fail(err, WEFT_ERR_RANGE, "\"%s\": the devices are the daemon's; leave the option out",
                          key);
-    if ((field->type == WEFT_FIELD_TEXT || field->type == WEFT_FIELD_TEXTS) && !is_classified(p->kind, key))
+    if (weft_job_kind_lists(p->kind->never, key) ||
+        ((field->type == WEFT_FIELD_TEXT || field->type == WEFT_FIELD_TEXTS) && !is_classified(p->kind, key)))
         return weft_fail(err, WEFT_ERR_USAGE, "\"%s\" cannot be given to a job", key); /* it may be a path */
     if (field->type == WEFT_FIELD_FLAG) {
         if (!json_is_boolean(value))
@@ -185,7 +186,7 @@ static weft_err add_devices(parse *p, const json_t *request, weft_error *err)
         const char *key, *value;
     } devices[] = {{"rig", p->rights->rig}, {"port", p->rights->port}, {"camera", p->rights->camera}};
     const json_t *const options = json_object_get(request, "options");
-    if (find_field(p->command, "library") && !json_object_get(options, "library"))
+    if (p->kind->in_library && !json_object_get(options, "library"))
         return add_option(p, "library", p->rights->root, err);
     for (int i = 0; i < 3; i++)
         if (json_object_get(options, devices[i].key))
@@ -205,6 +206,19 @@ static weft_err take_format(parse *p, const json_t *request, weft_error *err)
     if (strcmp(format, "json") != 0 && strcmp(format, "text") != 0)
         return weft_fail(err, WEFT_ERR_USAGE, "\"format\": wanted json or text");
     return strcmp(format, "json") == 0 ? add_word(p, weft_strdup("--json", err), err) : WEFT_OK;
+}
+
+/* Numbers of jobs; whether there are such jobs is for the queue to see. */
+static weft_err check_after(const json_t *request, weft_error *err)
+{
+    const json_t *after = NULL;
+    WEFT_TRY(weft_json_get_array(request, "after", WEFT_JSON_OPTIONAL, &after, "the job", err));
+    if (json_array_size(after) > MAX_AFTER)
+        return weft_fail(err, WEFT_ERR_USAGE, "\"after\": more than %d jobs", MAX_AFTER);
+    for (size_t i = 0; i < json_array_size(after); i++)
+        if (!json_is_integer(json_array_get(after, i)) || json_integer_value(json_array_get(after, i)) < 1)
+            return weft_fail(err, WEFT_ERR_USAGE, "\"after\": wanted a list of numbers of jobs");
+    return WEFT_OK;
 }
 
 static weft_err take_operands(parse *p, const json_t *request, weft_error *err)
@@ -264,6 +278,7 @@ static weft_err fill(parse *p, const json_t *request, weft_error *err)
     if (!p->job->words || !p->job->reads || !p->job->writes || !p->job->owner)
         return weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the job");
     WEFT_TRY(check_keys(request, err));
+    WEFT_TRY(check_after(request, err));
     WEFT_TRY(find_kind(p, request, err));
     WEFT_TRY(take_format(p, request, err));
     WEFT_TRY(take_options(p, request, err));
@@ -297,4 +312,13 @@ weft_err weft_job_request_parse(const char *bytes, size_t n, const weft_job_righ
 bool weft_job_request_holds(const json_t *request)
 {
     return json_is_true(json_object_get(request, "hold"));
+}
+
+bool weft_job_request_is_after(const json_t *request, int64_t id)
+{
+    const json_t *const after = json_object_get(request, "after");
+    for (size_t i = 0; i < json_array_size(after); i++)
+        if (json_integer_value(json_array_get(after, i)) == id)
+            return true;
+    return false;
 }

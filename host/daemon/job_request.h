@@ -39,4 +39,7 @@ weft_err weft_job_request_parse(const char *bytes, size_t n, const weft_job_righ
 /** Whether a request says so: {"hold": true}. */
 bool weft_job_request_holds(const json_t *request);
 
+/** Whether a request wants to wait for that job: {"after": [12]}. */
+bool weft_job_request_is_after(const json_t *request, int64_t id);
+
 #endif

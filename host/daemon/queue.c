@@ -148,10 +148,12 @@ json_t *weft_queue_describe(const weft_queue *queue, const weft_job *job)
     const running_job *const r = find_running(queue, job->id);
     const json_t *const operands = json_object_get(job->request, "operands");
     const json_t *const options = json_object_get(job->request, "options");
-    return json_pack("{s:I, s:s, s:o, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:i, s:b, s:o, s:o, s:o, s:o}", "id",
-                     (json_int_t)job->id, "command", job->command, "operands",
+    const json_t *const after = json_object_get(job->request, "after");
+    return json_pack("{s:I, s:s, s:o, s:o, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:i, s:b, s:o, s:o, s:o, s:o}",
+                     "id", (json_int_t)job->id, "command", job->command, "operands",
                      operands ? json_incref((json_t *)(uintptr_t)operands) : json_array(), "options",
-                     options ? json_incref((json_t *)(uintptr_t)options) : json_object(), "class",
+                     options ? json_incref((json_t *)(uintptr_t)options) : json_object(), "after",
+                     after ? json_incref((json_t *)(uintptr_t)after) : json_array(), "class",
                      job->hardware ? "hardware" : "cpu", "owner", job->owner, "state",
                      weft_job_state_name(job->state), "created", job->created, "started",
                      text_or_null(job->started), "finished", text_or_null(job->finished), "attempt",
@@ -228,18 +230,21 @@ static void on_report(void *context, json_t *message, int picture)
         close(picture);
 }
 
+static void tell_work(void *context, const char *path)
+{
+    const running_job *const r = context;
+    weft_events_add(r->queue->events, "library", r->job.id,
+                    json_pack("{s:s, s:I}", "path", path, "job", (json_int_t)r->job.id));
+}
+
 /* Enters what the job has made. */
 static void catalogue_works(running_job *r)
 {
     for (size_t i = 0; i < json_array_size(r->job.writes); i++) {
         weft_error error = {0};
-        bool known;
         const char *const path = json_string_value(json_array_get(r->job.writes, i));
-        if (weft_catalogue_index(r->queue->db, path, &known, &error) != WEFT_OK)
+        if (weft_catalogue_index_works(r->queue->db, path, tell_work, r, &error) != WEFT_OK)
             weft_warn("%s: cannot be catalogued: %s", path, error.text);
-        else if (known)
-            weft_events_add(r->queue->events, "library", r->job.id,
-                            json_pack("{s:s, s:I}", "path", path, "job", (json_int_t)r->job.id));
     }
 }
 
@@ -356,21 +361,33 @@ typedef struct survey {
     int n_waiting;
 } survey;
 
-static bool shares(const json_t *a, const json_t *b)
+/* Whether a path is the other, or lies in it. */
+static bool is_in(const char *path, const char *folder)
 {
-    for (size_t i = 0; i < json_array_size(a); i++)
-        for (size_t j = 0; j < json_array_size(b); j++)
-            if (json_equal(json_array_get(a, i), json_array_get(b, j)))
+    const size_t n = strlen(folder);
+    return strncmp(path, folder, n) == 0 && (path[n] == '/' || path[n] == '\0');
+}
+
+/* Whether a path of `works` is one of `paths`, or the folder that it lies in. */
+static bool holds(const json_t *works, const json_t *paths)
+{
+    for (size_t i = 0; i < json_array_size(works); i++)
+        for (size_t j = 0; j < json_array_size(paths); j++)
+            if (is_in(json_string_value(json_array_get(paths, j)),
+                      json_string_value(json_array_get(works, i))))
                 return true;
     return false;
 }
 
-/* Whether an earlier job makes what this one needs or makes, or needs what this one makes. */
+/* Whether an earlier job makes what this one needs or makes, or needs what this one makes, or is to be waited
+ * for.  (A job that looks at a folder does not wait for all that is made in it: the library would stand
+ * still while it is indexed.) */
 static bool conflicts(const survey *s, const weft_job *job)
 {
     for (int i = 0; i < s->n_earlier; i++) {
         const weft_job *const e = s->earlier[i];
-        if (shares(e->writes, job->reads) || shares(e->writes, job->writes) || shares(e->reads, job->writes))
+        if (holds(e->writes, job->reads) || holds(e->writes, job->writes) || holds(job->writes, e->writes) ||
+            holds(job->writes, e->reads) || weft_job_request_is_after(job->request, e->id))
             return true;
     }
     return false;

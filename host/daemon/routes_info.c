@@ -68,7 +68,8 @@ enum MHD_Result weft_route_commands(weft_http_request *r)
             continue;
         json_t *const options = json_array();
         for (const weft_field *f = (*c)->fields; f && f->key; f++)
-            json_array_append_new(options, describe_option(f));
+            if (!weft_job_kind_lists(kind->never, f->key))
+                json_array_append_new(options, describe_option(f));
         json_array_append_new(list, json_pack("{s:s, s:s, s:s, s:s, s:b, s:o}", "command", (*c)->name,
                                               "summary", (*c)->summary, "operands", (*c)->operands, "class",
                                               kind->hardware ? "hardware" : "cpu", "resumes", kind->resumes,

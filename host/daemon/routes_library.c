@@ -77,9 +77,10 @@ static const char *type_of(const char *name)
 {
     static const struct {
         const char *suffix, *type;
-    } types[] = {{".png", "image/png"},         {".jpg", "image/jpeg"},       {".jpeg", "image/jpeg"},
-                 {".json", "application/json"}, {".tif", "image/tiff"},       {".tiff", "image/tiff"},
-                 {".exr", "image/x-exr"},       {".dng", "image/x-adobe-dng"}};
+    } types[] = {{".png", "image/png"},         {".jpg", "image/jpeg"},        {".jpeg", "image/jpeg"},
+                 {".json", "application/json"}, {".tif", "image/tiff"},        {".tiff", "image/tiff"},
+                 {".exr", "image/x-exr"},       {".dng", "image/x-adobe-dng"}, {".ktx2", "image/ktx2"},
+                 {".glb", "model/gltf-binary"}};
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
         if (weft_path_has_suffix(name, types[i].suffix))
             return types[i].type;

@@ -71,6 +71,31 @@ weft_err weft_catalogue_index(weft_library_db *db, const char *path, bool *known
     return status;
 }
 
+weft_err weft_catalogue_index_works(weft_library_db *db, const char *path, weft_catalogue_found_fn *found,
+                                    void *context, weft_error *err)
+{
+    bool known;
+    const struct dirent *entry;
+    weft_err status = weft_catalogue_index(db, path, &known, err);
+    if (status == WEFT_OK && known)
+        found(context, path);
+    if (status != WEFT_OK || known || !relative_of(db, path))
+        return status;
+    DIR *const entries = opendir(path);
+    while (entries && status == WEFT_OK && (entry = readdir(entries)) != NULL) {
+        if (entry->d_name[0] == '.')
+            continue;
+        char *const inside = weft_path_join(path, entry->d_name, err);
+        status = inside ? weft_catalogue_index(db, inside, &known, err) : WEFT_ERR_NOMEM;
+        if (status == WEFT_OK && known)
+            found(context, inside);
+        weft_free(inside);
+    }
+    if (entries)
+        closedir(entries);
+    return status;
+}
+
 /* ---- going through all ---- */
 
 typedef struct walk {

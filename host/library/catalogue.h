@@ -32,6 +32,14 @@ weft_err weft_catalogue_reindex(weft_library_db *db, bool all, weft_progress *pr
  *  *known says whether it is an item now.  Paths outside the library are none. */
 weft_err weft_catalogue_index(weft_library_db *db, const char *path, bool *known, weft_error *err);
 
+/** Hears of an item, by the path that was given or the path of what lies in it. */
+typedef void weft_catalogue_found_fn(void *context, const char *path);
+
+/** weft_catalogue_index() of what a program has made: of the path, or, where that is a folder without being
+ *  an item itself (maps of many sets), of what lies in it. */
+weft_err weft_catalogue_index_works(weft_library_db *db, const char *path, weft_catalogue_found_fn *found,
+                                    void *context, weft_error *err);
+
 /** What is asked for; NULL and 0 are "any". */
 typedef struct weft_catalogue_query {
     const char *kind;

@@ -4,6 +4,7 @@
 #include "core/formats/exr_file.h"
 #include "core/json.h"
 #include "core/mem.h"
+#include "core/progress.h"
 #include "shading/bake/height_poisson.h"
 #include "shading/bake/material_file.h"
 #include "shading/bake/relief.h"
@@ -64,10 +65,13 @@ static weft_err save_state(const builder *b, weft_error *err)
     return status;
 }
 
+/* A step is done and on record; here a build may be cancelled, and goes on later. */
 static weft_err finish(builder *b, const char *step, const char key[65], weft_error *err)
 {
     json_object_set_new(b->keys, step, json_string(key));
-    return save_state(b, err);
+    WEFT_TRY(save_state(b, err));
+    return weft_cancelled() ? weft_fail(err, WEFT_ERR_CANCELLED, "cancelled; what is baked is kept")
+                            : WEFT_OK;
 }
 
 /* -- what is there ------------------------------------------------------------------------------------ */

@@ -1,6 +1,9 @@
 """Jobs of weftd: from an import to a preview, waiting for each other, cancelled, resumed, interrupted by SIGTERM
 and SIGKILL of the daemon."""
+import fcntl
+import filecmp
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -52,6 +55,107 @@ def test_events_of_a_job():
         assert next(iter(Watcher(d, last="999-1")))[1] == "snapshot"
         kinds = [kind for _, kind, __ in Watcher(d, f"?job={solve}").until(lambda _, kind, __: kind == "job.state")]
         assert kinds.count("job.state") == 1 and kinds.count("job.log") >= 1, kinds
+
+
+def write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def test_from_a_set_to_a_material():
+    """Solve, check, bake, look at it: queued at once; what they make is in the library and is served."""
+    with scratch() as folder, Weftd(folder, "--cpu-jobs", "4") as d:
+        make_flat(f"{d.library}/flat")
+        write(f"{d.library}/flat.radattr", 'include <cotton.radattr>\n:flat := ( cotton :scan = "flat.maps" )\n')
+        assert d.run("import", "flat", output="flat.set")["state"] == "done"
+        solve = d.add("solve", "flat.set", calibration="flat.cal", output="flat.maps")
+        check = d.add("check", "flat.set", calibration="flat.cal", map="error.exr", method="lsq")
+        # that the text names flat.maps, only the bake itself finds out
+        bake = d.add("bake", "flat.radattr", after=[solve], output="flat.material", export="png,gltf")
+        preview = d.add("preview", "flat.material", output="flat.png", size="64x48")
+        lint = d.add("lint", "flat.material/png")
+        jobs = {name: d.wait(i) for name, i in (("solve", solve), ("check", check), ("bake", bake), ("preview", preview),
+                                                ("lint", lint))}
+        assert {j["state"] for n, j in jobs.items() if n != "lint"} == {"done"}, jobs
+        assert jobs["bake"]["after"] == [solve] and jobs["bake"]["started"] >= jobs["solve"]["finished"]
+        assert jobs["bake"]["result"]["rebuilt"] >= 5 and jobs["check"]["result"]["relighting"]["rms_relative"] < 0.01, jobs
+        # a flat grey plate is a poor material, and lint says so: the job fails with its figures
+        assert jobs["lint"]["state"] in ("done", "failed") and jobs["lint"]["result"]["findings"], jobs["lint"]
+        items = {i["path"]: i for i in d.get("/v1/library").json["items"]}
+        assert items["flat.material"]["kind"] == "material" and items["flat.material"]["info"]["type"] == "clothmaterial"
+        assert items["flat.png"]["kind"] == items["error.exr"]["kind"] == "picture", items
+        for name, kind, begin in (("flat.png", "image/png", b"\x89PNG"), ("flat.material/albedo.exr", "image/x-exr", b"v/1\1"),
+                                  ("flat.material/png/albedo.png", "image/png", b"\x89PNG"),
+                                  ("flat.material/gltf/flat.glb", "model/gltf-binary", b"glTF"),
+                                  ("flat.material/material.json", "application/json", b"{")):
+            reply = d.get(f"/v1/files/{name}")
+            assert reply.status == 200 and reply.headers["Content-Type"] == kind and reply.bytes.startswith(begin), name
+        again = d.run("bake", "flat.radattr", output="flat.material", export="png,gltf")
+        assert again["state"] == "done" and again["result"]["rebuilt"] == 0, again
+        refused = d.post("/v1/jobs", {"command": "bake", "operands": ["flat.radattr"], "options": {"format": True}})
+        assert refused.status == 422 and "cannot be given" in refused.json["error"]["message"], refused.bytes
+
+
+def test_cancelled_bake_goes_on():
+    """What a cancelled bake has done is kept, and it ends as one that was left alone."""
+    with scratch() as folder, Weftd(folder) as d:
+        make_flat(f"{d.library}/flat", 200, 150)
+        write(f"{d.library}/big.radattr", 'include <cotton.radattr>\n:big := ( cotton :scan = "flat.maps" )\n')
+        assert d.run("import", "flat", output="flat.set")["state"] == "done"
+        assert d.run("solve", "flat.set", calibration="flat.cal", output="flat.maps")["state"] == "done"
+        for i in range(8):  # until one is caught at work
+            bake = d.add("bake", "big.radattr", output=f"big{i}.material", size="512x384")
+            while not (job := d.job(bake))["progress"] and job["state"] in ("queued", "running"):
+                time.sleep(0.002)
+            d.post(f"/v1/jobs/{bake}/cancel")
+            ended = d.wait(bake)
+            if ended["state"] == "cancelled":
+                break
+        assert job["progress"]["total"] > 0 and job["progress"]["unit"] == "rows", job
+        assert ended["state"] == "cancelled" and ended["exit_status"] == 130 and "cancelled" in ended["error"], ended
+        assert d.post(f"/v1/jobs/{bake}/resume").status == 202
+        ended = d.wait(bake)
+        assert ended["state"] == "done" and ended["attempt"] == 2, ended
+        assert d.run("bake", "big.radattr", output="whole.material", size="512x384")["state"] == "done"
+        for name in os.listdir(f"{d.library}/whole.material"):
+            if name.endswith(".exr"):
+                assert filecmp.cmp(f"{d.library}/whole.material/{name}", f"{d.library}/big{i}.material/{name}", False), name
+
+
+def test_batch():
+    """Many sets as one job: its progress, what it makes one by one in the library; a cancelled one goes on."""
+    with scratch() as folder, Weftd(folder) as d:
+        make_flat(f"{d.library}/flat", 200, 150)
+        names = [f"flat{i}.set" for i in range(4)]
+        words = {"calibration": "flat.cal", "output": "maps", "jobs": 1, "solve": ["method=lsq"]}
+        assert d.run("import", "flat", output=names[0], cal="flat.cal")["state"] == "done"
+        for name in names[1:]:
+            shutil.copytree(f"{d.library}/{names[0]}", f"{d.library}/{name}")
+        os.makedirs(f"{d.library}/maps/batch")
+        watcher = Watcher(d)
+        with open(f"{d.library}/maps/batch/flat3.lock", "w", encoding="utf-8") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # as another process that works on the set: the batch waits for it
+            batch = d.add("batch", *names, **words)
+            late = d.add("preview", "maps/flat3.maps", output="late.png", size="64x48")  # lies in what batch makes
+            seen = watcher.until(lambda _, kind, data: kind == "job.progress" and data["job"] == batch and data["done"] == 3)
+            assert seen[-1][2]["total"] == 4 and seen[-1][2]["unit"] == "sets", seen[-1]
+            assert d.job(late)["state"] == "queued"
+            assert d.post(f"/v1/jobs/{batch}/cancel").status == 202
+            ended = d.wait(batch)
+        assert ended["state"] == "cancelled" and ended["exit_status"] == 130, ended
+        assert d.wait(late)["state"] == "failed", "maps that were not solved"
+        maps = {f"maps/flat{i}.maps" for i in range(4)}
+        assert {i["path"] for i in d.get("/v1/library?kind=maps").json["items"]} == maps - {"maps/flat3.maps"}
+        assert d.post(f"/v1/jobs/{batch}/resume").status == 202
+        late = d.add("preview", "maps/flat3.maps", output="late.png", size="64x48")
+        ended = d.wait(batch)
+        assert ended["state"] == "done" and d.wait(late)["state"] == "done", (ended, d.job(late))
+        assert [s["state"] for s in ended["result"]["sets"]] == ["there already"] * 3 + ["solved"], ended["result"]["sets"]
+        assert {i["path"] for i in d.get("/v1/library?kind=maps").json["items"]} == maps
+        assert not children(d.process.pid)
+        for path in ("output=../x", "explain-plot=/tmp/x.svg"):
+            ended = d.run("batch", *names, **{**words, "solve": [path]})
+            assert ended["state"] == "failed" and "not for batches" in ended["error"], ended
 
 
 def begin_long_solve(d):
@@ -142,4 +246,4 @@ def test_one_daemon_per_library_and_socket():
 
 
 if __name__ == "__main__":
-    run_tests(globals())
+    run_tests(globals(), at_a_time=3)

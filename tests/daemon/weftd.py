@@ -105,8 +105,8 @@ class Weftd:
     def post(self, path, body=None, **more):
         return self.request("POST", path, body, **more)
 
-    def add(self, command, *operands, **options):
-        reply = self.post("/v1/jobs", {"command": command, "operands": list(operands),
+    def add(self, command, *operands, after=(), **options):
+        reply = self.post("/v1/jobs", {"command": command, "operands": list(operands), "after": list(after),
                                        "options": {k.replace("_", "-"): v for k, v in options.items()}})
         assert reply.status == 201, reply.bytes
         return reply.json["id"]
