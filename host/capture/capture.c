@@ -9,6 +9,7 @@
 #include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
+#include "host/capture/sidecar.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -155,16 +156,6 @@ static weft_err describe_set(capture_run *run, weft_error *err)
 
 /* ---- one frame ---- */
 
-static void name_frame(const weft_planned_frame *frame, char text[32])
-{
-    if (frame->role == WEFT_ROLE_LIGHT)
-        snprintf(text, 32, "light %d", frame->light);
-    else if (frame->role == WEFT_ROLE_ALL)
-        snprintf(text, 32, "the frame with all lights");
-    else
-        snprintf(text, 32, "the %s frame", weft_frame_role_name(frame->role));
-}
-
 /* A light that does not light must not pass for a dark side of the cloth. */
 static void check_brightness(const capture_run *run, const weft_planned_frame *frame, weft_shot *shot)
 {
@@ -210,7 +201,7 @@ static weft_err shoot_until_good(capture_run *run, const weft_planned_frame *fra
                                  json_t *retries, weft_error *err)
 {
     char what[32];
-    name_frame(frame, what);
+    weft_planned_frame_words(frame, what);
     for (int try = 1;; try++) {
         const weft_err status = shoot(run, frame, shot, err);
         if (status != WEFT_OK)
@@ -297,6 +288,8 @@ static json_t *describe_shot(const capture_run *run, const weft_planned_frame *f
                   "retries", retries, "statistics", weft_frame_stats_to_json(&shot->stats));
     if (o && run->o.average > 1)
         json_object_set_new(o, "mean_of", json_integer(run->o.average));
+    if (o && frame->bracket >= 0)
+        json_object_set_new(o, "bracket", json_integer(frame->bracket));
     if (!o || (!frame->lights && !shot->proved))
         return o;
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
@@ -339,8 +332,7 @@ static weft_err write_frame(const capture_run *run, const char *path, weft_error
 }
 
 /* Writes the file, then its row in set.json: a row's file is always whole. */
-static weft_err keep_frame(capture_run *run, const weft_planned_frame *planned, json_t *capture,
-                           weft_error *err)
+static weft_err keep_frame(capture_run *run, weft_planned_frame *planned, json_t *capture, weft_error *err)
 {
     weft_set_frame row = {.file = (char *)(uintptr_t)planned->file, /* copied, not changed */
                           .role = planned->role,
@@ -356,23 +348,25 @@ static weft_err keep_frame(capture_run *run, const weft_planned_frame *planned, 
         status = weft_sha256_file(path, row.sha256, err);
     weft_free(path);
     WEFT_TRY(status);
-    const int index = weft_set_folder_find(&run->set, planned->file);
-    if (index < 0) {
+    if (planned->row < 0) {
         WEFT_TRY(weft_set_add_frame(&run->set, &row, err));
+        planned->row = run->set.n_frames - 1;
     } else {
-        weft_set_frame *const old = &run->set.frames[index];
+        weft_set_frame *const old = &run->set.frames[planned->row];
         row.file = old->file;
         json_decref(old->capture);
         *old = row;
     }
     json_incref(capture); /* the set's own */
+    if (run->o.sidecar)
+        WEFT_TRY(weft_sidecar_write(&run->set, planned->row, err));
     return weft_set_save(&run->set, err);
 }
 
 /* Writing a frame on another thread. */
 typedef struct keep_job {
     capture_run *run;
-    const weft_planned_frame *frame;
+    weft_planned_frame *frame;
     json_t *capture;
     weft_err status;
     weft_error error;
@@ -387,7 +381,7 @@ static void *do_keep_job(void *context)
 
 /* A disk may take longer than the lease lasts: another thread writes while this one keeps the controller
  * awake.  Nothing else touches the run meanwhile. */
-static weft_err keep_frame_awake(capture_run *run, const weft_planned_frame *frame, json_t *capture,
+static weft_err keep_frame_awake(capture_run *run, weft_planned_frame *frame, json_t *capture,
                                  weft_error *err)
 {
     keep_job job = {.run = run, .frame = frame, .capture = capture};
@@ -457,6 +451,14 @@ static weft_err take_frames(capture_run *run, weft_error *err)
 
 /* ---- the whole ---- */
 
+static weft_err make_plan(capture_run *run, const weft_controller_info *info, const weft_camera_state *camera,
+                          weft_error *err)
+{
+    const char *const suffix = camera->suffix[0] && run->o.average == 1 ? camera->suffix : ".dng";
+    WEFT_TRY(weft_capture_plan_make(&run->o, info->n_lights, &run->set, suffix, &run->plan, err));
+    return run->plan.n > 0 ? WEFT_OK : weft_fail(err, WEFT_ERR_USAGE, "no frame is asked for");
+}
+
 static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
 {
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
@@ -469,19 +471,21 @@ static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
         WEFT_TRY(weft_set_folder_adopt(&run->set, &run->o, err));
     }
     WEFT_TRY(complete_options(run, info, err));
-    if (run->o.exposure_s <= 0)
+    if (found != WEFT_SET_INTERRUPTED)
+        WEFT_TRY(describe_set(run, err));
+    WEFT_TRY(
+        make_plan(run, info, camera, err)); /* once without exposures: a wish that cannot be fails at once */
+    if (run->o.exposure_s <= 0) {
         WEFT_TRY(find_exposure(run, info->n_lights, err));
-    weft_capture_plan_make(&run->o, info->n_lights,
-                           camera->suffix[0] && run->o.average == 1 ? camera->suffix : ".dng", &run->plan);
-    if (run->plan.n == 0)
-        return weft_fail(err, WEFT_ERR_USAGE, "no frame is asked for");
+        WEFT_TRY(make_plan(run, info, camera, err));
+    }
     WEFT_TRY(check_exposures(run, err));
     if (found == WEFT_SET_INTERRUPTED)
         WEFT_TRY(weft_set_folder_find_frames(&run->set, &run->plan, err));
+    else
+        WEFT_TRY(weft_set_folder_check_names(&run->o, found, &run->plan, err));
     WEFT_TRY(check_disk(run, err));
     WEFT_TRY(weft_set_folder_begin(&run->o, found, err));
-    if (found != WEFT_SET_INTERRUPTED)
-        WEFT_TRY(describe_set(run, err));
     return weft_set_folder_remember(&run->set, &run->o, info, err);
 }
 
@@ -523,6 +527,8 @@ static weft_err capture(capture_run *run, weft_error *err)
         if (status != WEFT_OK)
             return tell_what_is_kept(run, status, err);
     }
+    if (run->o.sidecar) /* of frames from before */
+        WEFT_TRY(weft_sidecar_write_missing(&run->set, err));
     run->set.complete = true;
     return weft_set_save(&run->set, err);
 }

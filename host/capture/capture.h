@@ -25,19 +25,21 @@
 
 /** What is to be captured.  {.folder = ...} alone is a sensible set: every light and the ambient frame. */
 typedef struct weft_capture_options {
-    const char *folder; /* "twill.set" */
-    const char *name;   /* NULL: the folder's name without ".set" */
-    uint32_t lights;    /* bit i: light i is photographed alone; 0: all lights of the controller */
-    bool no_lights;     /* no frame with a single light (a board needs only the frame with all) */
-    double exposure_s;  /* 0: found out so that the brightest thousandth lies at 70 % of the range */
-    double gain;        /* 0: the camera's base gain */
-    int bracket;        /* exposures per light, 1..WEFT_CAPTURE_MAX_BRACKET; 0: 1 */
-    int average;        /* frames of which each file is the mean, 1..WEFT_AVERAGE_MAX; 0: 1 */
-    int level;          /* brightness of the lights, 1..level_max; 0: full */
-    bool no_ambient;    /* no frame with all lights off */
-    bool all;           /* also one frame with all lights on */
-    bool dark;          /* also one frame with the lens capped */
-    double settle_s;    /* between light on and trigger; 0: 5 ms */
+    const char *folder;    /* "twill.set" */
+    const char *name;      /* NULL: the folder's name without ".set" */
+    uint32_t lights;       /* bit i: light i is photographed alone; 0: all lights of the controller */
+    bool no_lights;        /* no frame with a single light (a board needs only the frame with all) */
+    double exposure_s;     /* 0: found out so that the brightest thousandth lies at 70 % of the range */
+    double gain;           /* 0: the camera's base gain */
+    int bracket;           /* exposures per light, 1..WEFT_CAPTURE_MAX_BRACKET; 0: 1 */
+    int average;           /* frames of which each file is the mean, 1..WEFT_AVERAGE_MAX; 0: 1 */
+    int level;             /* brightness of the lights, 1..level_max; 0: full */
+    bool no_ambient;       /* no frame with all lights off */
+    bool all;              /* also one frame with all lights on */
+    bool dark;             /* also one frame with the lens capped */
+    const char *file_name; /* template of the files' names (frame_name.h); NULL: the default */
+    bool sidecar;          /* also FILE.json beside each frame (sidecar.h) */
+    double settle_s;       /* between light on and trigger; 0: 5 ms */
     weft_camera_trigger trigger;
     double deadline_s; /* how long after its exposure a frame may come; 0: 6 s */
     int tries;         /* per frame; 0: 3 */

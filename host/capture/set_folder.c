@@ -5,10 +5,12 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/sha256.h"
+#include "host/capture/sidecar.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -107,6 +109,19 @@ weft_err weft_set_folder_inspect(const weft_capture_options *o, weft_set_found *
     return WEFT_OK;
 }
 
+/* With the sidecar of a set that has them. */
+static weft_err remove_frame(const char *folder, const char *file, bool sidecars, weft_error *err)
+{
+    if (!sidecars)
+        return remove_file(folder, file, err);
+    char *const sidecar = weft_asprintf(err, "%s" WEFT_SIDECAR_SUFFIX, file);
+    if (!sidecar)
+        return WEFT_ERR_NOMEM;
+    const weft_err status = remove_file(folder, sidecar, err);
+    weft_free(sidecar);
+    return status == WEFT_OK ? remove_file(folder, file, err) : status;
+}
+
 /* set.json goes first: without it the frames are just files. */
 static weft_err remove_set(const char *folder, weft_error *err)
 {
@@ -114,10 +129,11 @@ static weft_err remove_set(const char *folder, weft_error *err)
     weft_err status = WEFT_OK;
     if (weft_set_load(folder, &old, NULL) != WEFT_OK) /* too damaged to name its frames */
         return remove_file(folder, "set.json", err);
+    const bool sidecars = json_is_true(json_object_get(json_object_get(old.other, "capture"), "sidecar"));
     status = remove_file(folder, "set.json", err);
     for (int i = 0; i < old.n_frames && status == WEFT_OK; i++)
         if (!strchr(old.frames[i].file, '/')) /* what lies elsewhere is not ours */
-            status = remove_file(folder, old.frames[i].file, err);
+            status = remove_frame(folder, old.frames[i].file, sidecars, err);
     weft_set_fini(&old);
     return status;
 }
@@ -169,6 +185,21 @@ static weft_err adopt_more(const json_t *stored, const char *key, bool *value, c
     return WEFT_OK;
 }
 
+/* The text lives as long as the set. */
+static weft_err adopt_file_name(const weft_set *set, const json_t *stored, const char **value,
+                                weft_error *err)
+{
+    const char *begun = WEFT_FRAME_NAME_DEFAULT;
+    WEFT_TRY(weft_json_get_text(stored, "file_name", WEFT_JSON_OPTIONAL, &begun, set->folder, err));
+    if (*value && strcmp(*value, begun) != 0)
+        return weft_fail(err, WEFT_ERR_MISMATCH,
+                         "%s: was begun with --file-name \"%s\", not \"%s\"; leave the option out, or begin "
+                         "anew with --force",
+                         set->folder, begun, *value);
+    *value = begun;
+    return WEFT_OK;
+}
+
 weft_err weft_set_folder_adopt(const weft_set *set, weft_capture_options *o, weft_error *err)
 {
     const json_t *const stored = json_object_get(set->other, "capture");
@@ -186,6 +217,8 @@ weft_err weft_set_folder_adopt(const weft_set *set, weft_capture_options *o, wef
     WEFT_TRY(adopt_int(set, stored, "level", &o->level, err));
     if (json_object_get(stored, "average")) /* sets of before had none */
         WEFT_TRY(adopt_int(set, stored, "average", &o->average, err));
+    WEFT_TRY(adopt_file_name(set, stored, &o->file_name, err));
+    WEFT_TRY(adopt_more(stored, "sidecar", &o->sidecar, set->folder, err));
     WEFT_TRY(adopt_more(stored, "no_lights", &o->no_lights, set->folder, err));
     WEFT_TRY(adopt_more(stored, "no_ambient", &o->no_ambient, set->folder, err));
     WEFT_TRY(adopt_more(stored, "all", &o->all, set->folder, err));
@@ -196,10 +229,11 @@ weft_err weft_set_folder_remember(weft_set *set, const weft_capture_options *o,
                                   const weft_controller_info *controller, weft_error *err)
 {
     json_t *const capture = json_pack(
-        "{s:I, s:f, s:f, s:f, s:i, s:i, s:i, s:b, s:b, s:b, s:b, s:{s:s, s:s, s:s}}", "lights",
+        "{s:I, s:f, s:f, s:f, s:i, s:i, s:i, s:s, s:b, s:b, s:b, s:b, s:b, s:{s:s, s:s, s:s}}", "lights",
         (json_int_t)o->lights, "exposure_s", o->exposure_s, "gain", o->gain, "settle_s", o->settle_s,
-        "bracket", o->bracket, "level", o->level, "average", o->average, "no_lights", o->no_lights,
-        "no_ambient", o->no_ambient, "all", o->all, "dark", o->dark, "controller", "firmware",
+        "bracket", o->bracket, "level", o->level, "average", o->average, "file_name",
+        o->file_name ? o->file_name : WEFT_FRAME_NAME_DEFAULT, "sidecar", o->sidecar, "no_lights",
+        o->no_lights, "no_ambient", o->no_ambient, "all", o->all, "dark", o->dark, "controller", "firmware",
         controller->firmware, "git_id", controller->git_id, "serial", controller->serial_number);
     if (!set->other)
         set->other = json_object();
@@ -229,12 +263,31 @@ weft_err weft_set_folder_check_camera(const weft_set *set, const char *backend,
     return WEFT_OK;
 }
 
-int weft_set_folder_find(const weft_set *set, const char *file)
+weft_err weft_set_folder_check_names(const weft_capture_options *o, weft_set_found found,
+                                     const weft_capture_plan *plan, weft_error *err)
 {
-    for (int i = 0; i < set->n_frames; i++)
-        if (strcmp(set->frames[i].file, file) == 0)
-            return i;
-    return -1;
+    weft_err status = WEFT_OK;
+    for (int i = 0; i < plan->n && found == WEFT_SET_NONE && status == WEFT_OK; i++) {
+        char *const path = weft_path_join(o->folder, plan->frames[i].file, err);
+        if (!path)
+            return WEFT_ERR_NOMEM;
+        if (weft_file_exists(path))
+            status = weft_fail(err, WEFT_ERR_EXISTS,
+                               "%s: is there and of no set; move it away, or give another --file-name", path);
+        weft_free(path);
+    }
+    return status;
+}
+
+/* Brackets of before are known by their names alone. */
+static bool is_planned(const weft_set_frame *row, const weft_planned_frame *planned)
+{
+    const json_t *const bracket = json_object_get(row->capture, "bracket");
+    if (row->role != planned->role || (row->role == WEFT_ROLE_LIGHT && row->light != planned->light))
+        return false;
+    if (bracket)
+        return json_integer_value(bracket) == planned->bracket;
+    return planned->bracket < 0 || strcmp(row->file, planned->file) == 0;
 }
 
 static weft_err is_intact(const weft_set *set, int index, bool *intact, weft_error *err)
@@ -255,9 +308,19 @@ static weft_err is_intact(const weft_set *set, int index, bool *intact, weft_err
 weft_err weft_set_folder_find_frames(const weft_set *set, weft_capture_plan *plan, weft_error *err)
 {
     for (int i = 0; i < plan->n; i++) {
-        const int index = weft_set_folder_find(set, plan->frames[i].file);
-        if (index >= 0)
-            WEFT_TRY(is_intact(set, index, &plan->frames[i].have, err));
+        weft_planned_frame *const f = &plan->frames[i];
+        for (int row = 0; row < set->n_frames && f->row < 0; row++)
+            if (is_planned(&set->frames[row], f))
+                f->row = row;
+        if (f->row < 0)
+            continue;
+        const char *const name = set->frames[f->row].file;
+        WEFT_TRY(is_intact(set, f->row, &f->have, err));
+        if (!f->have && (strchr(name, '/') || strlen(name) >= sizeof f->file))
+            return weft_fail(err, WEFT_ERR_MISMATCH,
+                             "%s: the file %s does not lie in it, and is not overwritten; begin anew",
+                             set->folder, name);
+        snprintf(f->file, sizeof f->file, "%s", name);
     }
     return WEFT_OK;
 }

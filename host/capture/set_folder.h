@@ -36,10 +36,14 @@ weft_err weft_set_folder_remember(weft_set *set, const weft_capture_options *opt
 weft_err weft_set_folder_check_camera(const weft_set *set, const char *backend,
                                       const weft_camera_state *camera, weft_error *err);
 
-/** Marks the planned frames that are there and have the hash that was recorded; warns of the others. */
-weft_err weft_set_folder_find_frames(const weft_set *set, weft_capture_plan *plan, weft_error *err);
+/** Refuses to write over files that are no frames of a set that is replaced: --force puts a set beside other
+ *  things, not in their place.  @return WEFT_ERR_EXISTS naming the file */
+weft_err weft_set_folder_check_names(const weft_capture_options *options, weft_set_found found,
+                                     const weft_capture_plan *plan, weft_error *err);
 
-/** Index of the frame with this file; -1 when the set has none. */
-int weft_set_folder_find(const weft_set *set, const char *file);
+/** Gives the planned frames the entries that the set has of them (whatever their files are called: by role,
+ *  light and place in the bracket), and marks those whose file has the hash that was recorded; warns of the
+ *  others. */
+weft_err weft_set_folder_find_frames(const weft_set *set, weft_capture_plan *plan, weft_error *err);
 
 #endif

@@ -1,6 +1,7 @@
 /* weft capture: photographs a sample under every light. */
 #include "host/capture/average.h"
 #include "host/capture/capture.h"
+#include "host/capture/frame_name.h"
 #include "host/capture/look.h"
 
 #include "core/log.h"
@@ -14,10 +15,10 @@
 
 typedef struct capture_args {
     weft_device_options devices;
-    const char *lights, *exposure, *name, *trigger;
+    const char *lights, *exposure, *name, *trigger, *file_name;
     double gain, settle_s;
     int bracket, average, level;
-    bool ambient, no_ambient, dark, all_frame, only_all, resume, dry_run;
+    bool ambient, no_ambient, dark, all_frame, only_all, resume, dry_run, sidecar;
 } capture_args;
 
 static const weft_field capture_fields[] = {
@@ -109,6 +110,16 @@ static const weft_field capture_fields[] = {
      .offset = offsetof(capture_args, name),
      .unit = "NAME",
      .help = "name of the sample (default: the folder's name without .set)"},
+    {.key = "file-name",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(capture_args, file_name),
+     .unit = "TEMPLATE",
+     .help = "names of the frames, of {set} {kind} {light} {bracket} {exposure} {index} {date} {time} "
+             "(default " WEFT_FRAME_NAME_DEFAULT ")"},
+    {.key = "sidecar",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(capture_args, sidecar),
+     .help = "also FILE.json beside each frame: what set.json and the raw file say of it"},
     {0},
 };
 
@@ -156,6 +167,8 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
         .all = a->all_frame || a->only_all,
         .dark = a->dark,
         .settle_s = a->settle_s,
+        .file_name = a->file_name,
+        .sidecar = a->sidecar,
         .resume = a->resume,
         .force = inv->force,
     };
@@ -173,6 +186,8 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
     if (a->resume && inv->force)
         return weft_fail(err, WEFT_ERR_USAGE,
                          "--resume keeps what is there and --force replaces it: give one");
+    if (a->file_name)
+        WEFT_TRY(weft_frame_name_check(a->file_name, err));
     WEFT_TRY(parse_lights(a->lights, &o->lights, err));
     return parse_exposure(a->exposure, &o->exposure_s, err);
 }

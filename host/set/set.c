@@ -320,7 +320,7 @@ out:
 
 /* ---- saving ---- */
 
-static json_t *describe_frame(const weft_set_frame *frame)
+json_t *weft_set_frame_to_json(const weft_set_frame *frame)
 {
     json_t *const object =
         json_pack("{s:s, s:s}", "file", frame->file, "role", weft_frame_role_name(frame->role));
@@ -337,7 +337,7 @@ static json_t *describe_frame(const weft_set_frame *frame)
     return object;
 }
 
-static json_t *describe_sensor(const weft_set *set)
+json_t *weft_set_sensor_to_json(const weft_set *set)
 {
     json_t *const sensor = json_pack("{s:i, s:i, s:s}", "width", set->width, "height", set->height, "cfa",
                                      weft_cfa_name(set->cfa));
@@ -364,13 +364,13 @@ static json_t *describe(const weft_set *set)
 {
     json_t *const frames = json_array();
     for (int i = 0; i < set->n_frames; i++)
-        json_array_append_new(frames, describe_frame(&set->frames[i])); /* names were checked: not NULL */
+        json_array_append_new(frames, weft_set_frame_to_json(&set->frames[i])); /* names were checked: not NULL */
     json_t *const camera = json_pack("{s:s, s:s, s:s}", "backend", set->camera_backend, "model",
                                      set->camera_model, "serial", set->camera_serial);
     json_t *const root = json_pack("{s:s, s:i, s:s, s:s, s:o, s:o, s:o, s:s}", "weft", "set", "version",
                                    WEFT_SET_VERSION, "name", set->name ? set->name : "", "created",
                                    set->created, "camera", with_unknown(camera, set, "camera"), "sensor",
-                                   with_unknown(describe_sensor(set), set, "sensor"), "frames", frames,
+                                   with_unknown(weft_set_sensor_to_json(set), set, "sensor"), "frames", frames,
                                    "state", set->complete ? "complete" : "capturing");
     if (root && set->mask_file)
         json_object_set_new(root, "mask", json_string(set->mask_file));

@@ -60,6 +60,11 @@ weft_err weft_set_load(const char *folder, weft_set *set, weft_error *err);
 /** Writes set.json into set->folder, whole or not at all. */
 weft_err weft_set_save(const weft_set *set, weft_error *err);
 
+/** What set.json says of a frame, and of the sensor; a new reference, NULL without memory or for a name that
+ *  is not UTF-8. */
+json_t *weft_set_frame_to_json(const weft_set_frame *frame);
+json_t *weft_set_sensor_to_json(const weft_set *set);
+
 /** Adds a frame (its `file` copied, its `capture` reference taken over). */
 weft_err weft_set_add_frame(weft_set *set, const weft_set_frame *frame, weft_error *err);
 

@@ -195,7 +195,6 @@ void run_well(const weft_capture_options *options, weft_capture_report *report)
     weft_set_fini(&set);
 }
 
-/* Every file of the folder is set.json or a frame in it with the recorded hash. */
 void check_folder(const char *folder, int n_frames, bool complete)
 {
     weft_set set;
@@ -208,7 +207,8 @@ void check_folder(const char *folder, int n_frames, bool complete)
     while ((entry = readdir(d)) != NULL)
         n_files += entry->d_name[0] != '.' || strncmp(entry->d_name, ".weft-", 6) == 0;
     closedir(d);
-    assert_int_equal(n_files, n_frames + 1);
+    const json_t *const sidecars = json_object_get(json_object_get(set.other, "capture"), "sidecar");
+    assert_int_equal(n_files, (json_is_true(sidecars) ? 2 : 1) * n_frames + 1);
     for (int i = 0; i < set.n_frames; i++) {
         char hex[65];
         char *const path = weft_set_frame_path(&set, i, NULL);

@@ -57,7 +57,8 @@ weft_err run(const weft_capture_options *options, weft_set *set, weft_capture_re
              weft_error *err);
 void run_well(const weft_capture_options *options, weft_capture_report *report);
 
-/** Every file of the folder is set.json or a frame in it with the recorded hash. */
+/** Every file of the folder is set.json, a frame in it with the recorded hash, or a sidecar where the set has
+ *  them. */
 void check_folder(const char *folder, int n_frames, bool complete);
 
 #endif

@@ -4,6 +4,7 @@
 
 #include "core/file.h"
 #include "core/formats/raw_file.h"
+#include "core/json.h"
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/capture/average.h"
@@ -228,6 +229,98 @@ static void test_a_bracket(void **state)
     assert_false(weft_file_exists(wide.folder));
 }
 
+/* Names from a template; set.json says what each file is, so a renamed one is found again. */
+static void test_names_of_files(void **state)
+{
+    (void)state;
+    weft_capture_options options = {.folder = weft_test_path("names.set"),
+                                    .exposure_s = 0.04,
+                                    .lights = 1 << 2 | 1 << 9,
+                                    .bracket = 2,
+                                    .file_name = "{set}_{kind}{light}_{exposure}"};
+    weft_capture_report report;
+    weft_set set;
+    char from[1200], to[1200];
+    plan_deed(CANCEL_IT, 2, 1); /* between the two exposures of light 2 */
+    assert_fails(run(&options, &set, &report, err), WEFT_ERR_CANCELLED, "2 of 5 frames");
+    weft_cancel_request(false);
+    assert_ok(weft_set_load(options.folder, &set, err));
+    assert_string_equal(set.frames[0].file, "names_ambient_0.04s.dng");
+    assert_string_equal(set.frames[1].file, "names_light02_0.04s.dng");
+    weft_free(set.frames[1].file); /* as a user who renames a file and says so */
+    set.frames[1].file = weft_strdup("renamed.dng", NULL);
+    assert_ok(weft_set_save(&set, err));
+    weft_set_fini(&set);
+    snprintf(from, sizeof from, "%s/names_light02_0.04s.dng", options.folder);
+    snprintf(to, sizeof to, "%s/renamed.dng", options.folder);
+    assert_int_equal(rename(from, to), 0);
+    options.resume = true;
+    options.file_name = "{kind}-{light}-{bracket}";
+    assert_fails(run(&options, &set, &report, err), WEFT_ERR_MISMATCH,
+                 "was begun with --file-name \"{set}_{kind}{light}_{exposure}\"");
+    options.file_name = NULL;
+    run_well(&options, &report);
+    assert_true(report.n_kept == 2 && report.n_taken == 3);
+    check_folder(options.folder, 5, true);
+    assert_int_equal(truncate(to, 100), 0); /* and is taken again under its new name */
+    run_well(&options, &report);
+    assert_true(report.n_kept == 4 && report.n_taken == 1);
+    check_folder(options.folder, 5, true);
+
+    weft_capture_options one = {.folder = weft_test_path("one-name.set"), .file_name = "{kind}"};
+    const int before = bench.n_exposures;
+    assert_fails(run(&one, &set, &report, err), WEFT_ERR_USAGE,
+                 "light 0 and light 1 would both be light.dng");
+    assert_false(weft_file_exists(one.folder));
+    assert_int_equal(bench.n_exposures, before); /* before the exposure is looked for */
+}
+
+/* What is written beside a frame says what set.json and the file say, and goes with the set. */
+static void test_sidecars(void **state)
+{
+    (void)state;
+    weft_capture_options options = {
+        .folder = weft_test_path("sidecar.set"), .exposure_s = 0.04, .lights = 3, .sidecar = true};
+    weft_capture_report report;
+    weft_set set;
+    char path[1200];
+    plan_deed(CANCEL_IT, 2, 1);
+    assert_fails(run(&options, &set, &report, err), WEFT_ERR_CANCELLED, "2 of 3 frames");
+    weft_cancel_request(false);
+    check_folder(options.folder, 2, false);
+    snprintf(path, sizeof path, "%s/light-00.dng.json", options.folder);
+    assert_int_equal(unlink(path), 0);
+    options.resume = true;
+    options.sidecar = false; /* as the set was begun */
+    run_well(&options, &report);
+    check_folder(options.folder, 3, true); /* the lost one is made again */
+    assert_ok(weft_set_load(options.folder, &set, err));
+    json_t *sidecar = NULL, *const row = weft_set_frame_to_json(&set.frames[1]);
+    assert_ok(weft_json_load_kind(path, "frame", 1, &sidecar, err));
+    assert_true(json_equal(json_object_get(sidecar, "frame"), row));
+    assert_string_equal(json_string_value(json_object_get(json_object_get(sidecar, "camera"), "serial")),
+                        "B1");
+    const json_t *const tags = json_object_get(sidecar, "tags");
+    assert_near(json_real_value(json_object_get(tags, "ExposureTime")), 0.04, 1e-6);
+    assert_string_equal(json_string_value(json_object_get(tags, "CFAPattern")), "GBRG");
+    assert_string_equal(json_string_value(json_object_get(tags, "Model")), "Bench");
+    assert_near(json_number_value(json_object_get(tags, "WhiteLevel")), WHITE, 0);
+    json_decref(row);
+    json_decref(sidecar);
+    weft_set_fini(&set);
+    options.resume = false;
+    options.force = true;
+    run_well(&options, &report);
+    check_folder(options.folder, 3, true); /* the old sidecars went with their frames */
+
+    weft_capture_options beside = {
+        .folder = weft_test_path("beside"), .exposure_s = 0.04, .lights = 1, .force = true};
+    assert_ok(weft_folder_create(beside.folder, err));
+    snprintf(path, sizeof path, "%s/light-00.dng", beside.folder);
+    assert_ok(weft_file_write(path, "x", 1, err));
+    assert_fails(run(&beside, &set, &report, err), WEFT_ERR_EXISTS, "light-00.dng: is there and of no set");
+}
+
 static void test_exposure_is_found(void **state)
 {
     (void)state;
@@ -417,6 +510,8 @@ int main(void)
         ON_BENCH(test_a_board_that_resets_is_noticed),
         ON_BENCH(test_a_folder_of_other_things),
         ON_BENCH(test_a_bracket),
+        ON_BENCH(test_names_of_files),
+        ON_BENCH(test_sidecars),
         ON_BENCH(test_exposure_is_found),
         ON_BENCH(test_the_dark_frame_comes_last),
         ON_BENCH(test_wishes_that_cannot_be),
