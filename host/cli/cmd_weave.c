@@ -62,9 +62,11 @@ static weft_err write_tile(const weft_maps *from, const weft_weave *weave, weft_
                       .normal = tiles[0],
                       .albedo = tiles[1],
                       .albedo_is_srgb = from->albedo_is_srgb};
-    maps.info = json_pack("{s:b, s:[i,i], s:[f,f], s:f}", "periodic", 1, "repeat_threads", weave->threads[0],
-                          weave->threads[1], "step_px", hypot(weave->step_px[0][0], weave->step_px[0][1]),
-                          hypot(weave->step_px[1][0], weave->step_px[1][1]), "skew_deg", weave->skew_deg);
+    maps.info =
+        json_pack("{s:b, s:[i,i], s:[f,f], s:f, s:[f,f]}", "periodic", 1, "repeat_threads", weave->threads[0],
+                  weave->threads[1], "step_px", hypot(weave->step_px[0][0], weave->step_px[0][1]),
+                  hypot(weave->step_px[1][0], weave->step_px[1][1]), "skew_deg", weave->skew_deg, "bow",
+                  weave->bow[0], weave->bow[1]);
     maps.origin_mm[0] = -0.5 * (maps.width - 1) * maps.mm_per_px;
     maps.origin_mm[1] = 0.5 * (maps.height - 1) * maps.mm_per_px;
     const weft_err status = weft_maps_save(folder, &maps, force, err);
@@ -81,22 +83,27 @@ static weft_err report(const weft_invocation *inv, const weft_maps *maps, const 
     if (inv->json)
         return weft_print_json(
             inv,
-            json_pack("{s:[f,f], s:[f,f], s:[i,i], s:[f,f], s:f, s:[i,i], s:[i,i], s:[f,f], s:[f,f], s:f}",
-                      "threads_per_cm", per_cm[0], per_cm[1], "step_px",
-                      hypot(weave->step_px[0][0], weave->step_px[0][1]),
-                      hypot(weave->step_px[1][0], weave->step_px[1][1]), "repeat", weave->threads[0],
-                      weave->threads[1], "likeness", weave->likeness[0], weave->likeness[1], "skew_deg",
-                      weave->skew_deg, "tile_threads", seam->threads[0], seam->threads[1], "tile_px",
-                      tile->width, tile->height, "seam_step", seam->across[0], seam->across[1], "inner_step",
-                      seam->inside[0], seam->inside[1], "repetition", seam->repetition),
+            json_pack(
+                "{s:[f,f], s:[f,f], s:[i,i], s:[f,f], s:f, s:[f,f], s:[i,i], s:[i,i], s:[f,f], s:[f,f], s:f}",
+                "threads_per_cm", per_cm[0], per_cm[1], "step_px",
+                hypot(weave->step_px[0][0], weave->step_px[0][1]),
+                hypot(weave->step_px[1][0], weave->step_px[1][1]), "repeat", weave->threads[0],
+                weave->threads[1], "likeness", weave->likeness[0], weave->likeness[1], "skew_deg",
+                weave->skew_deg, "bow", weave->bow[0], weave->bow[1], "tile_threads", seam->threads[0],
+                seam->threads[1], "tile_px", tile->width, tile->height, "seam_step", seam->across[0],
+                seam->across[1], "inner_step", seam->inside[0], seam->inside[1], "repetition",
+                seam->repetition),
             err);
     if (maps->mm_per_px > 0)
         fprintf(inv->out, "threads    %.2f x %.2f per cm\n", per_cm[0], per_cm[1]);
     else
         fprintf(inv->out, "threads    every %.2f x %.2f pixels; the maps have no scale\n",
                 1 / weave->threads_per_px[0], 1 / weave->threads_per_px[1]);
-    fprintf(inv->out, "repeat     %d x %d threads (likeness %.2f, %.2f), skew %.2f deg\n", weave->threads[0],
-            weave->threads[1], weave->likeness[0], weave->likeness[1], weave->skew_deg);
+    fprintf(inv->out,
+            "repeat     %d x %d threads (likeness %.2f, %.2f), skew %.2f deg, bow %.2f %% of the warp, %.2f "
+            "%% of the weft\n",
+            weave->threads[0], weave->threads[1], weave->likeness[0], weave->likeness[1], weave->skew_deg,
+            100 * weave->bow[0], 100 * weave->bow[1]);
     fprintf(inv->out, "tile       %d x %d threads, %d x %d pixels\n", seam->threads[0], seam->threads[1],
             tile->width, tile->height);
     fprintf(inv->out, "seam       steps %.4f, %.4f; the largest inside %.4f, %.4f\n", seam->across[0],
@@ -109,7 +116,7 @@ static weft_err run(const weft_invocation *inv, const void *void_args, weft_erro
 {
     const weave_args *const args = void_args;
     weft_maps maps;
-    weft_weave weave;
+    weft_weave weave = {0};
     weft_seam seam;
     weft_image tiles[2] = {{0}};
     WEFT_TRY(weft_maps_load(inv->operands[0], &maps, err));
@@ -131,6 +138,7 @@ static weft_err run(const weft_invocation *inv, const void *void_args, weft_erro
         status = report(inv, &maps, &weave, &seam, &tiles[0], err);
     weft_image_fini(&tiles[0]);
     weft_image_fini(&tiles[1]);
+    weft_weave_fini(&weave);
     weft_maps_fini(&maps);
     return status;
 }
@@ -144,7 +152,7 @@ const weft_command weft_cmd_weave = {
     .args_size = sizeof(weave_args),
     .fields = fields,
     .details = "Warp and weft should lie about along the picture (6 degrees are fine); the tile is "
-               "straightened to them.",
+               "straightened to them, bow and waves included.",
     .example = "weft weave twill.maps -o twill-tile.maps --picture tile.png --tile 3",
     .run = run,
 };

@@ -4,13 +4,27 @@
 #include "core/mem.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-enum { LONGEST_REPEAT = 16, LEAST_THREADS = 6, SLOWEST = 9 /* threads of a wave that counts */ };
+enum {
+    LONGEST_REPEAT = 48,
+    SKIRT = 4 /* bins */,
+    LEAST_THREADS = 6,
+    SLOWEST = 9 /* threads of a wave that counts */
+};
 
 /* Peaks are looked for within this slope of an axis (6 degrees), and above this frequency (cycles a picture).
  */
 #define AXIS_SLOPE 0.1
+
+/* Times the mean around it that a peak is of threads. */
+#define LEAST_PEAK 25
+
+/* Correlations less apart are noise: every thread is like the next. */
+#define LEAST_SCORE 0.1
+/* A multiple of a repeat that was found must do better by this: a sett of colours does. */
+#define LEAST_GAIN 0.35
 
 /* A field prepared for spectra: mean taken away, a Hann window, its cas-cas transform. */
 typedef struct spectrum {
@@ -64,18 +78,41 @@ static double vertex(double left, double middle, double right)
     return curve < 0 ? fmin(fmax(0.5 * (a - c) / curve, -0.5), 0.5) : 0;
 }
 
+static double power_along(const spectrum *s, int axis, int f, int o)
+{
+    return axis ? power(s, o, f) : power(s, f, o);
+}
+
+/* Whether a peak is more than the strongest of so much noise: its power over the mean of its surroundings in
+ * the wedge, from 0.7 to 1.4 of its frequency and without its own skirt.  Of noise the strongest of ten
+ * thousand has nine times the mean. */
+static bool stands_out(const spectrum *s, int axis, int peak_f, int peak_o)
+{
+    const int n = axis ? s->h : s->w, across = axis ? s->w : s->h,
+              reach = (int)(AXIS_SLOPE * peak_f * across / n) + 3;
+    const int last = (int)fmin(1.4 * peak_f + 4, n / 2 - 1);
+    double sum = 0;
+    int count = 0;
+    for (int f = (int)fmax(0.7 * peak_f - 4, 2); f <= last; f++)
+        for (int o = -reach; o <= reach; o++)
+            if (abs(f - peak_f) > SKIRT || abs(o - peak_o) > SKIRT) {
+                sum += power_along(s, axis, f, o);
+                count++;
+            }
+    return power_along(s, axis, peak_f, peak_o) * count > LEAST_PEAK * sum;
+}
+
 /* The strongest peak near an axis (0: along u), as cycles a pixel; false when it does not stand out. */
 static bool find_peak(const spectrum *s, int axis, double k[2])
 {
     const int n = axis ? s->h : s->w, across = axis ? s->w : s->h;
-    double best = 0, all = 0;
+    double best = 0;
     int best_f = 0, best_o = 0;
     for (int f = LEAST_THREADS; f < n / 2 - 1; f++) {
         const int reach = (int)(AXIS_SLOPE * f * across / n) + 1;
         for (int o = -reach; o <= reach; o++) {
             /* slopes of heights: a harmonic of the same relief counts by its frequency squared less */
-            const double p = (axis ? power(s, o, f) : power(s, f, o)) / ((double)f * f);
-            all += p;
+            const double p = power_along(s, axis, f, o) / ((double)f * f);
             if (p > best) {
                 best = p;
                 best_f = f;
@@ -83,14 +120,13 @@ static bool find_peak(const spectrum *s, int axis, double k[2])
             }
         }
     }
-    if (best_f == 0 || best < 0.05 * all)
+    if (best_f == 0 || !stands_out(s, axis, best_f, best_o))
         return false;
+    const double at = power_along(s, axis, best_f, best_o);
     const double df =
-        axis ? vertex(power(s, best_o, best_f - 1), power(s, best_o, best_f), power(s, best_o, best_f + 1))
-             : vertex(power(s, best_f - 1, best_o), power(s, best_f, best_o), power(s, best_f + 1, best_o));
+        vertex(power_along(s, axis, best_f - 1, best_o), at, power_along(s, axis, best_f + 1, best_o));
     const double d_o =
-        axis ? vertex(power(s, best_o - 1, best_f), power(s, best_o, best_f), power(s, best_o + 1, best_f))
-             : vertex(power(s, best_f, best_o - 1), power(s, best_f, best_o), power(s, best_f, best_o + 1));
+        vertex(power_along(s, axis, best_f, best_o - 1), at, power_along(s, axis, best_f, best_o + 1));
     k[axis] = (best_f + df) / n;
     k[1 - axis] = (best_o + d_o) / across;
     return true;
@@ -168,23 +204,29 @@ static double likeness_near(const spectrum *s, double dx, double dy)
     return best;
 }
 
-/* How much more the picture is like itself after every n threads than after other numbers. */
-static double repeat_score(const double *likeness, int longest, int n)
+/* By how much the picture is more like itself after every n threads than after the other multiples of m; 0
+ * when that is within what chance does to single threads (three sigma of the others). */
+static double repeat_score(const double *likeness, int longest, int m, int n)
 {
-    double at = 0, beside = 0;
-    int n_at = 0;
-    for (int k = 1; k <= longest; k++) {
+    double at = 0, beside = 0, squares = 0;
+    int n_at = 0, n_beside = 0;
+    for (int k = m; k <= longest; k += m) {
         *(k % n ? &beside : &at) += likeness[k];
-        n_at += k % n == 0;
+        squares += k % n ? likeness[k] * likeness[k] : 0;
+        *(k % n ? &n_beside : &n_at) += 1;
     }
-    return n > 1 && n_at > 0 ? at / n_at - beside / (longest - n_at) : 0;
+    if (n_at == 0 || n_beside == 0)
+        return 0;
+    beside /= n_beside;
+    const double score = at / n_at - beside, chance = sqrt(fmax(squares / n_beside - beside * beside, 0));
+    return score > (m > 1 ? LEAST_GAIN : LEAST_SCORE) && score > 3 * chance / sqrt(n_at) ? score : 0;
 }
 
-/* The number of threads that stands out most from those between; the smallest, where multiples stand out as
- * well. */
+/* The number of threads that stands out most from those between; the smallest, where multiples stand out no
+ * more. */
 static void find_repeat(const spectrum *s, weft_weave *weave, int axis)
 {
-    double likeness[LONGEST_REPEAT + 1], best = 0.1; /* less is noise: every thread is like the next */
+    double likeness[LONGEST_REPEAT + 1], best = 0;
     int longest = LONGEST_REPEAT;
     const double size = axis ? s->h : s->w;
     while (longest > 1 && longest * hypot(weave->step_px[axis][0], weave->step_px[axis][1]) > 0.4 * size)
@@ -193,9 +235,10 @@ static void find_repeat(const spectrum *s, weft_weave *weave, int axis)
         likeness[n] = likeness_near(s, n * weave->step_px[axis][0], n * weave->step_px[axis][1]);
     weave->threads[axis] = 1;
     for (int n = 2; n <= longest; n++) {
-        const double score = repeat_score(likeness, longest, n);
-        if (score > best) {
-            best = 1.05 * score;
+        const int m = weave->threads[axis];
+        const double score = repeat_score(likeness, longest, 1, n);
+        if (n % m == 0 ? repeat_score(likeness, longest, m, n) > 0 : score > 1.05 * best) {
+            best = score;
             weave->threads[axis] = n;
         }
     }
@@ -225,30 +268,91 @@ static void invert(const double k[2][2], weft_weave *weave)
     weave->skew_deg = (weft - warp) * 180 / acos(-1);
 }
 
+/* Follows the threads of one system and mends its wave vector.  Threads that cannot be followed are left
+ * where the lattice says they are. */
+static weft_err follow(const weft_image *normal, const float *slope, int axis, double k[2], weft_weave *weave,
+                       weft_error *err)
+{
+    weft_thread_lie *const lie = &weave->lie[axis];
+    const weft_err status = weft_thread_lie_read(slope, normal->width, normal->height, k, lie, err);
+    if (status == WEFT_OK) {
+        const double chord_px = lie->cell_px * ((axis ? lie->shift.width : lie->shift.height) - 1);
+        weave->bow[axis] = weft_thread_lie_bow(lie, !axis) / hypot(k[0], k[1]) / fmax(chord_px, 1);
+    }
+    return status == WEFT_ERR_NODATA ? WEFT_OK : status;
+}
+
+/* The two wave vectors, from the spectra of the slopes, and how the threads lie. */
+static weft_err find_threads(spectrum *s, const weft_image *normal, float *field, weft_weave *weave,
+                             weft_error *err)
+{
+    double k[2][2];
+    for (int axis = 0; axis < 2; axis++) {
+        slope_field(normal, axis, field);
+        WEFT_TRY(transform(s, field, err));
+        if (!find_peak(s, axis, k[axis]))
+            return weft_fail(err, WEFT_ERR_NODATA,
+                             "no threads are seen %s: is it a weave, flat and along the picture?",
+                             axis ? "down the picture" : "across the picture");
+        WEFT_TRY(follow(normal, field, axis, k[axis], weave, err));
+    }
+    invert((const double(*)[2])k, weave);
+    return WEFT_OK;
+}
+
+void weft_weave_fini(weft_weave *weave)
+{
+    for (int axis = 0; axis < 2; axis++)
+        weft_thread_lie_fini(&weave->lie[axis]);
+}
+
+void weft_weave_place(const weft_weave *weave, const double even[2], double at[2])
+{
+    at[0] = even[0];
+    at[1] = even[1];
+    /* the shift changes by a hundredth of a thread a thread: three steps settle it */
+    for (int i = 0; i < 3; i++) {
+        const double warp = weft_thread_lie_at(&weave->lie[0], at[0], at[1]);
+        const double weft = weft_thread_lie_at(&weave->lie[1], at[0], at[1]);
+        for (int c = 0; c < 2; c++)
+            at[c] = even[c] - warp * weave->step_px[0][c] - weft * weave->step_px[1][c];
+    }
+}
+
+/* What tells threads apart, laid straight: both slopes and the albedo in one field. */
+static weft_err lay_straight(const weft_image *normal, const weft_image *albedo, const weft_weave *weave,
+                             float *field, weft_error *err)
+{
+    weft_image both;
+    WEFT_TRY(weft_image_init(&both, normal->width, normal->height, 1, err));
+    slope_field(normal, 0, both.data);
+    slope_field(normal, 1, field);
+    for (size_t i = 0; i < weft_image_plane_size(normal); i++)
+        both.data[i] += field[i] + (albedo->planes ? 2 * weft_image_plane(albedo, albedo->planes > 1)[i] : 0);
+    for (int y = 0; y < both.height; y++)
+        for (int x = 0; x < both.width; x++) {
+            double at[2];
+            weft_weave_place(weave, (const double[2]){x, y}, at);
+            field[(size_t)y * (size_t)both.width + (size_t)x] = weft_image_sample(&both, 0, at[0], at[1]);
+        }
+    weft_image_fini(&both);
+    return WEFT_OK;
+}
+
 weft_err weft_weave_find(const weft_image *normal, const weft_image *albedo, weft_weave *weave,
                          weft_error *err)
 {
     spectrum s = {.w = normal->width, .h = normal->height};
     float *const field = weft_alloc(weft_image_plane_size(normal), sizeof *field, err);
-    double k[2][2];
+    *weave = (weft_weave){0};
     weft_err status =
         field ? weft_fourier_create(s.w, s.h, WEFT_FOURIER_HARTLEY, &s.fourier, err) : WEFT_ERR_NOMEM;
-    for (int axis = 0; axis < 2 && status == WEFT_OK; axis++) {
-        slope_field(normal, axis, field);
+    if (status == WEFT_OK)
+        status = find_threads(&s, normal, field, weave, err);
+    if (status == WEFT_OK)
+        status = lay_straight(normal, albedo, weave, field, err);
+    if (status == WEFT_OK)
         status = transform(&s, field, err);
-        if (status == WEFT_OK && !find_peak(&s, axis, k[axis]))
-            status = weft_fail(err, WEFT_ERR_NODATA,
-                               "no threads are seen %s: is it a weave, flat and along the picture?",
-                               axis ? "down the picture" : "across the picture");
-    }
-    if (status == WEFT_OK) {
-        invert((const double(*)[2])k, weave);
-        /* colours repeat too: both slopes and the albedo in one field */
-        for (size_t i = 0; i < weft_image_plane_size(normal); i++)
-            field[i] += weft_image_plane(normal, 0)[i] / fmaxf(weft_image_plane(normal, 2)[i], 0.05F) +
-                        (albedo->planes ? 2 * weft_image_plane(albedo, albedo->planes > 1)[i] : 0);
-        status = transform(&s, field, err);
-    }
     if (status == WEFT_OK) {
         const double own = correlate(&s, weave);
         for (int axis = 0; axis < 2; axis++)
@@ -257,6 +361,8 @@ weft_err weft_weave_find(const weft_image *normal, const weft_image *albedo, wef
             else /* every thread is like the next: a net, or too blurred to see more */
                 weave->threads[axis] = 1, weave->likeness[axis] = 1;
     }
+    if (status != WEFT_OK)
+        weft_weave_fini(weave);
     weft_fourier_destroy(s.fourier);
     weft_free(s.t);
     weft_free(field);

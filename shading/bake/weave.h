@@ -3,13 +3,14 @@
  *
  * Averaged along its threads every thread of a weave looks like the next, so the slope across them has the
  * frequency of the threads as the strongest peak of its spectrum near that axis (weighted to heights); both
- * peaks give the two spacings and the skew between warp and weft.  After how many threads the weave repeats
- * is read off the autocorrelation along the two directions.
+ * peaks give the two spacings and the skew between warp and weft, and demodulation by them how the threads
+ * lie (weave_lie.h).  After how many threads the weave repeats is read off the autocorrelation along the two
+ * directions.
  */
 #ifndef WEFT_SHADING_BAKE_WEAVE_H
 #define WEFT_SHADING_BAKE_WEAVE_H
 
-#include "core/image.h"
+#include "shading/bake/weave_lie.h"
 
 /** What was found. */
 typedef struct weft_weave {
@@ -19,10 +20,18 @@ typedef struct weft_weave {
     int threads[2];           /* after how many the weave repeats */
     double likeness[2];       /* correlation of the picture with itself after that, 0..1 */
     double skew_deg;          /* of the weft against the perpendicular of the warp */
+    double bow[2]; /* largest distance of a warp thread, of a weft thread, from its chord, over the chord */
+    weft_thread_lie lie[2]; /* how warp and weft lie off that lattice; empty where they cannot be followed */
 } weft_weave;
 
+void weft_weave_fini(weft_weave *weave);
+
+/** Where in the picture the cloth lies that would be at `even` if all threads lay on the lattice: pixels, right
+ *  and down. */
+void weft_weave_place(const weft_weave *weave, const double even[2], double at[2]);
+
 /**
- * Finds the repeat.
+ * Finds the repeat.  Fills `weave`, to be freed by weft_weave_fini().
  * @param normal  3 planes
  * @param albedo  3 planes, or planes 0
  * @return WEFT_ERR_NODATA when there is no repeat to be seen (felt, leather, a map too small)
@@ -39,7 +48,8 @@ typedef struct weft_seam {
 } weft_seam;
 
 /**
- * Cuts the largest rectangle of whole repeats, straightened to the threads, and closes it: in the overlap of
+ * Cuts the largest rectangle of whole repeats, straightened to the threads (skew, bow and waves: every thread
+ * of the tile lies on the even lattice), and closes it: in the overlap of
  * a repeat the path of least difference of albedo and slopes together is cut (dynamic programming; Efros and
  * Freeman 2001) and blended over some pixels.
  *

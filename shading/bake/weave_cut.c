@@ -11,6 +11,7 @@
 
 /* Where the tile lies in the picture, and how large it is with the overlap of a repeat. */
 typedef struct plan {
+    const weft_weave *weave;
     double origin[2], across[2], down[2]; /* pixels a pixel of the tile */
     int width, height, overlap[2], threads[2];
 } plan;
@@ -25,13 +26,28 @@ static void extent(const weft_weave *weave, int n, int m, double low[2], double 
     }
 }
 
+/* How far at most the threads lie off their lattice, pixels. */
+static double farthest_off(const weft_weave *weave)
+{
+    double most = 0;
+    for (int c = 0; c < 2; c++) {
+        const weft_image *const shift = &weave->lie[c].shift;
+        const double step = hypot(weave->step_px[c][0], weave->step_px[c][1]);
+        for (size_t i = 0; shift->planes && i < weft_image_plane_size(shift); i++)
+            most = fmax(most, step * fabs((double)shift->data[i]));
+    }
+    return most;
+}
+
 static weft_err make_plan(const weft_weave *weave, int w, int h, plan *p, weft_error *err)
 {
     const double length[2] = {hypot(weave->step_px[0][0], weave->step_px[0][1]),
                               hypot(weave->step_px[1][0], weave->step_px[1][1])};
-    const double size[2] = {w - 2, h - 2};
+    const double room = 1 + farthest_off(weave);
+    const double size[2] = {w - 2 * room, h - 2 * room};
     double low[2], high[2];
     int n[2];
+    p->weave = weave;
     for (int c = 0; c < 2; c++) /* one repeat more than the tile, for the overlap */
         n[c] = (int)(size[c] / (length[c] * weave->threads[c]));
     do { /* a skewed tile needs more room than its sides */
@@ -47,7 +63,7 @@ static weft_err make_plan(const weft_weave *weave, int w, int h, plan *p, weft_e
     for (int c = 0; c < 2; c++) {
         p->threads[c] = (n[c] - 1) * weave->threads[c];
         p->overlap[c] = (int)(weave->threads[c] * length[c]);
-        p->origin[c] = 1 - low[c] + (size[c] - (high[c] - low[c])) / 2;
+        p->origin[c] = room - low[c] + (size[c] - (high[c] - low[c])) / 2;
     }
     p->width = (int)lround(p->threads[0] * length[0]);
     p->height = (int)lround(p->threads[1] * length[1]);
@@ -65,26 +81,37 @@ typedef struct straighten {
     bool normals;
 } straighten;
 
+/* Where a pixel of the tile lies in the picture. */
+static void source_of(const plan *p, double x, double y, double at[2])
+{
+    const double even[2] = {p->origin[0] + x * p->across[0] + y * p->down[0],
+                            p->origin[1] + x * p->across[1] + y * p->down[1]};
+    weft_weave_place(p->weave, even, at);
+}
+
 static void straighten_rows(void *context, int band, int begin, int end)
 {
     const straighten *const s = context;
-    const plan *const p = s->plan;
-    const double turn = hypot(p->across[0], p->across[1]);
-    const double c = p->across[0] / turn, d = -p->across[1] / turn; /* rows go down: y up in the maps */
     (void)band;
-    for (int y = begin; y < end; y++)
+    for (int y = begin; y < end; y++) {
+        double at[2], next[2];
+        source_of(s->plan, 0, y, next);
         for (int x = 0; x < s->to->width; x++) {
-            const double u = p->origin[0] + x * p->across[0] + y * p->down[0];
-            const double v = p->origin[1] + x * p->across[1] + y * p->down[1];
+            memcpy(at, next, sizeof at);
+            source_of(s->plan, x + 1, y, next);
             for (int k = 0; k < s->to->planes; k++)
-                weft_image_row(s->to, k, y)[x] = weft_image_sample(s->from, k, u, v);
+                weft_image_row(s->to, k, y)[x] = weft_image_sample(s->from, k, at[0], at[1]);
             if (!s->normals)
                 continue;
+            /* turned as the cloth is here; rows go down, y goes up in the maps */
+            const double turn = hypot(next[0] - at[0], next[1] - at[1]);
+            const double c = (next[0] - at[0]) / turn, d = -(next[1] - at[1]) / turn;
             float *const nx = &weft_image_row(s->to, 0, y)[x], *const ny = &weft_image_row(s->to, 1, y)[x];
             const double a = (double)*nx, b = (double)*ny;
             *nx = (float)(c * a + d * b);
             *ny = (float)(c * b - d * a);
         }
+    }
 }
 
 static float slope(const weft_image *normal, int plane, size_t i)

@@ -66,6 +66,7 @@ static void check_repeats(void **state)
             assert_near(hypot(found.step_px[axis][0], found.step_px[axis][1]) / truth, 1, 0.005);
             assert_int_equal(found.threads[axis], weaves[i].repeat);
         }
+        weft_weave_fini(&found);
         weft_image_fini(&normal);
     }
 }
@@ -106,6 +107,8 @@ static void check_cut(void **state)
         weft_image_fini(&tiles[k]);
     weft_image_fini(&normal);
     weft_image_fini(&albedo);
+
+    weft_weave_fini(&found);
 
     make(&normal, 60, 60, step, 5, 4, 2); /* not two repeats of 41 x 47 pixels */
     found.threads[0] = found.threads[1] = 5;
