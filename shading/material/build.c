@@ -8,6 +8,7 @@
 #include "shading/bake/height_poisson.h"
 #include "shading/bake/material_file.h"
 #include "shading/bake/relief.h"
+#include "shading/bake/toksvig.h"
 #include "shading/material/build_key.h"
 
 #include <dirent.h>
@@ -537,6 +538,16 @@ static void key_export(const builder *b, const weft_exporter *exporter, char hex
     weft_build_key_end(&key, hex);
 }
 
+/* Average Toksvig gloss of every level (S-FC3-15): for engines that take one number a level. */
+static json_t *average_glosses(const weft_baked *whole)
+{
+    double gloss[WEFT_BAKED_MAX_MIPS] = {0};
+    const int n = whole->maps[WEFT_BAKED_NORMAL_LENGTH].n_mips;
+    for (int level = 0; level < n; level++)
+        gloss[level] = weft_toksvig_average_gloss(whole, level);
+    return weft_json_numbers(gloss, n);
+}
+
 static weft_err export_one(builder *b, const weft_exporter *exporter, const weft_baked *whole,
                            weft_error *err)
 {
@@ -549,10 +560,10 @@ static weft_err export_one(builder *b, const weft_exporter *exporter, const weft
         const weft_export_job job = {whole, a.temp_path, json_array()};
         status = exporter->write(&job, err);
         char *const lost = weft_path_join(a.temp_path, "report.json", err);
-        json_t *const report =
-            json_pack("{s:s, s:s, s:o, s:o, s:O, s:O}", "exporter", exporter->name, "material", whole->name,
-                      "size_mm", weft_json_numbers(whole->size_mm, 2), "cannot_carry", job.lost, "inputs",
-                      b->inputs, "properties", b->properties);
+        json_t *const report = json_pack(
+            "{s:s, s:s, s:o, s:o, s:o, s:O, s:O}", "exporter", exporter->name, "material", whole->name,
+            "size_mm", weft_json_numbers(whole->size_mm, 2), "average_toksvig_gloss", average_glosses(whole),
+            "cannot_carry", job.lost, "inputs", b->inputs, "properties", b->properties);
         if (status == WEFT_OK)
             status = lost && report ? weft_json_save(lost, report, err) : WEFT_ERR_NOMEM;
         json_decref(report);

@@ -7,6 +7,7 @@
 
 #include "shading/bake/gloss.h"
 #include "shading/bake/mips.h"
+#include "shading/bake/toksvig.h"
 #include "shading/bake/vmf.h"
 
 #include <math.h>
@@ -178,6 +179,42 @@ static void check_fixed_point(void **state)
 }
 
 /* Means keep their energy, whatever the size; coverage keeps the share of texels that pass. */
+/* One number a level, against the power written out: 1/m' = 1/m + (1 - |n|)/|n| (S-FC3-14). */
+static void check_average_toksvig(void **state)
+{
+    (void)state;
+    weft_baked b;
+    const weft_mip_options options = {.rule = WEFT_MIP_TOKSVIG};
+    make_normals(&b, plain);
+    b.maps[WEFT_BAKED_ROUGHNESS].constant[0] = 0.1F;
+    assert_near(weft_toksvig_average_gloss(&b, 3), log2(2 / 0.01 - 2) / 13, 1e-6); /* no map of lengths yet */
+    assert_ok(weft_mips_make(&b, &options, err));
+    double last = 1;
+    for (int level = 0; level < 6; level++) {
+        const double alpha = (double)b.maps[WEFT_BAKED_ROUGHNESS].constant[0], m = 2 / (alpha * alpha) - 2;
+        const int side = SIDE >> level;
+        double sum = 0;
+        for (int y = 0; y < side; y++)
+            for (int x = 0; x < side; x++) {
+                double mean[3] = {0, 0, 0}; /* of the normals of level 0 */
+                for (int k = 0; k < 1 << (2 * level); k++)
+                    for (int c = 0; c < 3; c++)
+                        mean[c] += (double)weft_image_row(&b.maps[WEFT_BAKED_NORMAL].mips[0], c,
+                                                          (y << level) +
+                                                              (k >> level))[(x << level) + k % (1 << level)] /
+                                   (1 << (2 * level));
+                const double length =
+                    fmin(sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]), 1);
+                sum += fmax(0, log2(1 / (1 / m + (1 - length) / length)) / 13);
+            }
+        const double gloss = weft_toksvig_average_gloss(&b, level);
+        assert_near(gloss, sum / (side * side), 1e-4);
+        assert_true(gloss < last + 1e-9); /* coarser levels are duller */
+        last = gloss;
+    }
+    weft_baked_fini(&b);
+}
+
 static void check_means_and_coverage(void **state)
 {
     (void)state;
@@ -218,6 +255,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(check_against_drawn_normals),
         cmocka_unit_test(check_fixed_point),
+        cmocka_unit_test(check_average_toksvig),
         cmocka_unit_test(check_means_and_coverage),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
