@@ -6,28 +6,28 @@
 #include "shading/brdf/schlick_smith.h"
 
 /** Power of a gloss 0..1: m = 2^(13 g), 1..8192.  Source: S-FC3-10. */
-static inline double weft_blinn_phong_power(double gloss)
+WEFT_INLINE weft_real weft_blinn_phong_power(weft_real gloss)
 {
-    return weft_exp_negative(13 * 0.69314718055994530942 * gloss);
+    return weft_exp_negative(13 * WEFT_LN2 * gloss);
 }
 
 /** Gloss of a power, cut to 0..1; a power of 0 or less gives 0.  Source: S-FC3-14. */
-static inline double weft_blinn_phong_gloss(double power)
+WEFT_INLINE weft_real weft_blinn_phong_gloss(weft_real power)
 {
-    const double gloss = power > 1 ? log2(power) / 13 : 0;
+    const weft_real gloss = power > 1 ? weft_log_positive(power) / (13 * WEFT_LN2) : 0;
     return gloss < 1 ? gloss : 1;
 }
 
 /** Power whose lobe is as wide as Beckmann's alpha: 2/alpha^2 - 2.  Source: S-BLG-04, S-CNV-04. */
-static inline double weft_blinn_phong_power_of_alpha(double alpha)
+WEFT_INLINE weft_real weft_blinn_phong_power_of_alpha(weft_real alpha)
 {
     return 2 / (alpha * alpha) - 2;
 }
 
 /** Beckmann's alpha of a power: sqrt(2/(m + 2)). */
-static inline double weft_blinn_phong_alpha_of_power(double power)
+WEFT_INLINE weft_real weft_blinn_phong_alpha_of_power(weft_real power)
 {
-    return sqrt(2 / (power + 2));
+    return weft_sqrt(2 / (power + 2));
 }
 
 /**
@@ -37,14 +37,15 @@ static inline double weft_blinn_phong_alpha_of_power(double power)
  *
  * The seed prints (n.v)^m, which does not depend on h and integrates to 33 in place of 1 (m 64): h is meant.
  *
- * @param s2     1 - nh^2 without cancellation (half.h); nh^m = (1 - s2)^(m/2)
+ * @param nh,s2  n.h and 1 - nh^2, both without cancellation (half_vector.h); nh^m = (1 - s2)^(m/2)
  * @param power  m >= 0
  * Source: S-FC3-10 (which calls D/4 "D").
  */
-static inline double weft_blinn_phong_d(double s2, double power)
+WEFT_INLINE weft_real weft_blinn_phong_d(weft_real nh, weft_real s2, weft_real power)
 {
-    const double log_nh = s2 < 1 ? 0.5 * weft_log_one_minus(s2) : -1e4;
-    return (power + 2) / 6.28318530717958647692 * weft_exp_negative(power * log_nh);
+    const weft_real log = weft_log_of(s2 < WEFT_R(0.5) ? 1 - s2 : nh * nh, -s2);
+    const weft_real log_nh2 = nh > 0 ? log : WEFT_R(-2e4);
+    return (power + 2) / (2 * WEFT_PI) * weft_exp_negative(WEFT_R(0.5) * power * log_nh2);
 }
 
 /**
@@ -54,28 +55,28 @@ static inline double weft_blinn_phong_d(double s2, double power)
  *
  * @param k  0 < k < 1; weft_schlick_k_power().  Source: S-FC3-13, with the square the first line leaves out.
  */
-static inline double weft_blinn_phong_average_visibility(double k)
+WEFT_INLINE weft_real weft_blinn_phong_average_visibility(weft_real k)
 {
-    const double mean = -log(k) / (1 - k);
+    const weft_real mean = -weft_log_positive(k) / (1 - k);
     return mean * mean;
 }
 
 /** Normalisation with the visibility averaged away: E = (m + 2)/8 avgV; f = E F nh^m/pi.  Twice too strong
  *  at normal view and far too weak at grazing ones.  Source: S-FC3-13. */
-static inline double weft_blinn_phong_energy(double power)
+WEFT_INLINE weft_real weft_blinn_phong_energy(weft_real power)
 {
     return (power + 2) / 8 * weft_blinn_phong_average_visibility(weft_schlick_k_power(power));
 }
 
 /** The seed's fit of weft_blinn_phong_energy(): 2^(-1.85689 + 16.1624 g).  Called "extremely accurate"
  *  there; it is half of the truth at g = 0 and within 10 % only above g = 0.5.  Source: S-FC3-13. */
-static inline double weft_blinn_phong_energy_fit(double gloss)
+WEFT_INLINE weft_real weft_blinn_phong_energy_fit(weft_real gloss)
 {
-    return exp2(-1.85689 + 16.1624 * gloss);
+    return weft_exp_negative(WEFT_LN2 * (WEFT_R(16.1624) * gloss - WEFT_R(1.85689)));
 }
 
 /** What was shipped: (2 m + 1)/8, below weft_blinn_phong_energy() everywhere.  Source: S-FC3-13. */
-static inline double weft_blinn_phong_energy_shipped(double power)
+WEFT_INLINE weft_real weft_blinn_phong_energy_shipped(weft_real power)
 {
     return (2 * power + 1) / 8;
 }

@@ -48,6 +48,15 @@ typedef struct weft_brdf_batch {
     const void *data;                          /* the model's own */
 } weft_brdf_batch;
 
+/** The same in single precision. */
+typedef struct weft_brdf_batch_f32 {
+    int n;
+    const float *light[3];
+    const float *view[3];
+    const float *param[WEFT_BRDF_MAX_PLANES];
+    const void *data;
+} weft_brdf_batch_f32;
+
 typedef struct weft_brdf {
     const char *name;    /* "ggx", lower case, what the user types */
     const char *summary; /* one line */
@@ -58,6 +67,11 @@ typedef struct weft_brdf {
 
     /** Writes f [3][n], 1/sr.  Never NaN, infinite or negative for unit vectors and parameters in range. */
     void (*eval)(const weft_brdf_batch *batch, double *const value[3]);
+
+    /** The same built in single precision from the same source (real.h), for pictures: within 1e-5 of eval,
+     *  or 1e-6/sr where f itself is next to nothing, at the same rounded arguments.  Directions less than
+     *  1e-12 from opposite count as opposite. */
+    void (*eval_f32)(const weft_brdf_batch_f32 *batch, float *const value[3]);
 
     /** Draws light directions for the views (n.v > 0) from uniform numbers u [3][n] in [0, 1); a direction
      *  may lie below the surface: it carries no light but counts as a sample.  NULL: no sampling. */

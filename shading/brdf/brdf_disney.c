@@ -1,8 +1,5 @@
 #include "shading/brdf/disney.h"
 #include "shading/brdf/fresnel.h"
-#include "shading/brdf/sampling.h"
-
-#include "core/clones.h"
 
 /* first planes, in the order of params */
 enum {
@@ -19,6 +16,67 @@ enum {
     CLEARCOAT_GLOSS
 };
 
+/* What of one pair of directions does not depend on the colour. */
+typedef struct terms {
+    weft_real diffuse;   /* of the base colour */
+    weft_real sheen;     /* of the sheen's colour */
+    weft_real specular;  /* of F */
+    weft_real clearcoat; /* without colour */
+    weft_real weight;    /* Schlick's, of lh */
+} terms;
+
+/* Where it is not `lit` the terms are 0, and the cosines may be anything. */
+WEFT_INLINE terms terms_of(const weft_brdf_batch_real *b, int i, const weft_half *h, weft_real lit)
+{
+    const weft_real rough = b->param[ROUGHNESS][i], metallic = b->param[METALLIC][i];
+    const weft_real nl = lit > 0 ? h->lit : 1, nh = lit > 0 ? h->nh : 1;
+    const weft_real *const hv = h->h;
+    weft_real at, ab;
+    terms t = {.weight = weft_schlick_power(h->grazing)};
+    weft_disney_widths(rough, b->param[ANISOTROPIC][i], &at, &ab);
+    const weft_real fd = weft_disney_diffuse(nl, h->nv, h->lh, rough);
+    const weft_real ss = weft_disney_subsurface(nl, h->nv, h->lh, rough);
+    t.diffuse = weft_mix(fd, ss, b->param[SUBSURFACE][i]) / WEFT_PI * (1 - metallic) * lit;
+    t.sheen = lit * t.weight * b->param[SHEEN][i] * (1 - metallic);
+    const weft_real ag =
+        (WEFT_R(0.5) + rough / 2) * (WEFT_R(0.5) + rough / 2); /* masking of a rougher lobe than D's */
+    t.specular =
+        lit * weft_ggx_d_aniso(hv[0], hv[1], nh, at, ab) * weft_ggx_v1(nl, ag) * weft_ggx_v1(h->nv, ag);
+    const weft_real coat =
+        weft_disney_gtr1(nh, h->s2, weft_mix(WEFT_R(0.1), WEFT_R(0.001), b->param[CLEARCOAT_GLOSS][i]));
+    t.clearcoat = lit * WEFT_R(0.25) * b->param[CLEARCOAT][i] * weft_mix(WEFT_R(0.04), 1, t.weight) * coat *
+                  weft_ggx_v1(nl, WEFT_R(0.25)) * weft_ggx_v1(h->nv, WEFT_R(0.25));
+    return t;
+}
+
+/* f = [weft_mix(Fd, ss, subsurface) C/pi + sheen] (1 - metallic) + Gs Fs Ds + clearcoat/4 Gr Fr Dr, S-BLG-05.
+ * Below either horizon it is 0, as published: no raised n.v. */
+WEFT_CLONES
+void WEFT_KERNEL(weft_brdf_eval_disney)(const weft_brdf_batch_real *b, weft_real *const value[3])
+{
+    WEFT_INDEPENDENT
+    for (int i = 0; i < b->n; i++) {
+        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
+                                         b->view[1][i], b->view[2][i]);
+        const terms t = terms_of(b, i, &h, b->view[2][i] > 0 ? h.valid : 0);
+        const weft_real luminance = WEFT_R(0.3) * b->param[BASE][i] + WEFT_R(0.6) * b->param[BASE + 1][i] +
+                                    WEFT_R(0.1) * b->param[BASE + 2][i];
+        for (int c = 0; c < 3; c++) {
+            const weft_real base = b->param[BASE + c][i],
+                            tint = luminance > 0 ? base / (luminance > 0 ? luminance : 1) : 1;
+            const weft_real dielectric =
+                WEFT_R(0.08) * b->param[SPECULAR][i] * weft_mix(1, tint, b->param[SPECULAR_TINT][i]);
+            const weft_real f0 = weft_mix(dielectric, base, b->param[METALLIC][i]);
+            value[c][i] = t.diffuse * base + t.sheen * weft_mix(1, tint, b->param[SHEEN_TINT][i]) +
+                          t.specular * weft_mix(f0, 1, t.weight) + t.clearcoat;
+        }
+    }
+}
+
+#ifndef WEFT_SINGLE /* what there is once */
+
+#include "shading/brdf/sampling.h"
+
 static const weft_brdf_param params[] = {
     {"base", NULL, 3, 0, 1, 0.5, "", "base colour"},
     {"subsurface", NULL, 1, 0, 1, 0, "", "share of the flatter diffuse lobe"},
@@ -34,67 +92,6 @@ static const weft_brdf_param params[] = {
     {0},
 };
 
-WEFT_INLINE double lerp(double a, double b, double t)
-{
-    return a + (b - a) * t;
-}
-
-/* What of one pair of directions does not depend on the colour. */
-typedef struct terms {
-    double diffuse;   /* of the base colour */
-    double sheen;     /* of the sheen's colour */
-    double specular;  /* of F */
-    double clearcoat; /* without colour */
-    double weight;    /* Schlick's, of lh */
-} terms;
-
-/* Where it is not `lit` the terms are 0, and the cosines may be anything. */
-WEFT_INLINE terms terms_of(const weft_brdf_batch *b, int i, const weft_half *h, double lit)
-{
-    const double rough = b->param[ROUGHNESS][i], metallic = b->param[METALLIC][i];
-    const double nl = lit > 0 ? h->nl : 1, nh = lit > 0 ? h->nh : 1;
-    const double wl = weft_schlick_weight(nl), wv = weft_schlick_weight(h->nv);
-    const double *const hv = h->h;
-    double at, ab;
-    terms t = {.weight = weft_schlick_weight(h->lh)};
-    weft_disney_widths(rough, b->param[ANISOTROPIC][i], &at, &ab);
-    const double fd = weft_disney_diffuse(wl, wv, h->lh, rough);
-    const double ss = weft_disney_subsurface(wl, wv, nl, h->nv, h->lh, rough);
-    t.diffuse = lerp(fd, ss, b->param[SUBSURFACE][i]) / WEFT_PI * (1 - metallic) * lit;
-    t.sheen = lit * t.weight * b->param[SHEEN][i] * (1 - metallic);
-    const double ag = (0.5 + rough / 2) * (0.5 + rough / 2); /* masking of a rougher lobe than D's */
-    t.specular =
-        lit * weft_ggx_d_aniso(hv[0], hv[1], nh, at, ab) * weft_ggx_v1(nl, ag) * weft_ggx_v1(h->nv, ag);
-    const double coat = weft_disney_gtr1(nh, h->s2, lerp(0.1, 0.001, b->param[CLEARCOAT_GLOSS][i]));
-    t.clearcoat = lit * 0.25 * b->param[CLEARCOAT][i] * weft_fresnel_schlick(0.04, h->lh) * coat *
-                  weft_ggx_v1(nl, 0.25) * weft_ggx_v1(h->nv, 0.25);
-    return t;
-}
-
-/* f = [lerp(Fd, ss, subsurface) C/pi + sheen] (1 - metallic) + Gs Fs Ds + clearcoat/4 Gr Fr Dr, S-BLG-05.
- * Below either horizon it is 0, as published: no raised n.v. */
-WEFT_CLONES
-static void eval(const weft_brdf_batch *b, double *const value[3])
-{
-    WEFT_INDEPENDENT
-    for (int i = 0; i < b->n; i++) {
-        const weft_half h = weft_half_of(b->light[0][i], b->light[1][i], b->light[2][i], b->view[0][i],
-                                         b->view[1][i], b->view[2][i]);
-        const terms t = terms_of(b, i, &h, b->view[2][i] > 0 ? h.valid : 0);
-        const double luminance =
-            0.3 * b->param[BASE][i] + 0.6 * b->param[BASE + 1][i] + 0.1 * b->param[BASE + 2][i];
-        for (int c = 0; c < 3; c++) {
-            const double base = b->param[BASE + c][i],
-                         tint = luminance > 0 ? base / (luminance > 0 ? luminance : 1) : 1;
-            const double dielectric =
-                0.08 * b->param[SPECULAR][i] * lerp(1, tint, b->param[SPECULAR_TINT][i]);
-            const double f0 = lerp(dielectric, base, b->param[METALLIC][i]);
-            value[c][i] = t.diffuse * base + t.sheen * lerp(1, tint, b->param[SHEEN_TINT][i]) +
-                          t.specular * lerp(f0, 1, t.weight) + t.clearcoat;
-        }
-    }
-}
-
 static void widths(const weft_brdf_batch *b, int i, double *at, double *ab)
 {
     weft_disney_widths(b->param[ROUGHNESS][i], b->param[ANISOTROPIC][i], at, ab);
@@ -103,7 +100,7 @@ static void widths(const weft_brdf_batch *b, int i, double *at, double *ab)
 static double specular_share(const weft_brdf_batch *b, int i)
 {
     const double base = (b->param[BASE][i] + b->param[BASE + 1][i] + b->param[BASE + 2][i]) / 3;
-    const double f0 = lerp(0.08 * b->param[SPECULAR][i], base, b->param[METALLIC][i]);
+    const double f0 = weft_mix(0.08 * b->param[SPECULAR][i], base, b->param[METALLIC][i]);
     return weft_sample_share(weft_fresnel_schlick(f0, weft_max(b->view[2][i], 0)),
                              base * (1 - b->param[METALLIC][i]));
 }
@@ -133,7 +130,10 @@ const weft_brdf weft_brdf_disney = {
     .source = "Burley 2012, Physically-Based Shading at Disney; S-BLG-05",
     .flags = WEFT_BRDF_RECIPROCAL | WEFT_BRDF_ANISOTROPIC,
     .params = params,
-    .eval = eval,
+    .eval = weft_brdf_eval_disney,
+    .eval_f32 = weft_brdf_eval_disney_f32,
     .sample = sample,
     .pdf = pdf,
 };
+
+#endif

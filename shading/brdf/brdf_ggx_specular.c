@@ -1,14 +1,5 @@
 #include "shading/brdf/fresnel.h"
-#include "shading/brdf/sampling.h"
-
-#include "core/clones.h"
-
-static const weft_brdf_param params[] = {
-    {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
-    {"alpha", NULL, 1, 1e-4, 1, 0.3, "",
-     "roughness, the width of the lobe (the square of the artist's value)"},
-    {0},
-};
+#include "shading/brdf/ggx.h"
 
 /*
  * f = D(nh) F(lh) V1(nl) V1(nv), S-ORD-05.
@@ -17,25 +8,36 @@ static const weft_brdf_param params[] = {
  * with h from the true v, instead of being black as eq. 10 of the seed has it.
  */
 WEFT_CLONES
-static void eval(const weft_brdf_batch *b, double *const value[3])
+void WEFT_KERNEL(weft_brdf_eval_ggx_specular)(const weft_brdf_batch_real *b, weft_real *const value[3])
 {
-    const double *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
-    const double *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
-    const double *const fr = b->param[0], *const fg = b->param[1], *const fb = b->param[2];
-    const double *const alpha = b->param[3];
-    double *const r = value[0], *restrict const g = value[1], *restrict const bl = value[2];
+    const weft_real *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
+    const weft_real *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
+    const weft_real *const fr = b->param[0], *const fg = b->param[1], *const fb = b->param[2];
+    const weft_real *const alpha = b->param[3];
+    weft_real *const r = value[0], *restrict const g = value[1], *restrict const bl = value[2];
     WEFT_INDEPENDENT
     for (int i = 0; i < b->n; i++) {
         const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
-        const double nl = h.valid > 0 ? h.nl : 1;
-        const double dv = h.valid * weft_ggx_d(h.nh, h.s2, alpha[i]) * weft_ggx_v1(nl, alpha[i]) *
-                          weft_ggx_v1(h.nv, alpha[i]);
-        const double w = weft_schlick_weight(h.lh);
+        const weft_real nl = h.lit;
+        const weft_real dv = h.valid * weft_ggx_d(h.nh, h.s2, alpha[i]) * weft_ggx_v1(nl, alpha[i]) *
+                             weft_ggx_v1(h.nv, alpha[i]);
+        const weft_real w = weft_schlick_power(h.grazing);
         r[i] = dv * (fr[i] + (1 - fr[i]) * w);
         g[i] = dv * (fg[i] + (1 - fg[i]) * w);
         bl[i] = dv * (fb[i] + (1 - fb[i]) * w);
     }
 }
+
+#ifndef WEFT_SINGLE /* what there is once */
+
+#include "shading/brdf/sampling.h"
+
+static const weft_brdf_param params[] = {
+    {"f0", NULL, 3, 0, 1, 0.04, "", "reflectance at normal incidence"},
+    {"alpha", NULL, 1, 1e-4, 1, 0.3, "",
+     "roughness, the width of the lobe (the square of the artist's value)"},
+    {0},
+};
 
 static void sample(const weft_brdf_batch *b, const double *const u[3], double *const light[3])
 {
@@ -55,7 +57,10 @@ const weft_brdf weft_brdf_ggx_specular = {
     .source = "The Order: 1886 (Neubelt, Pettineo 2013) eqs. 1-10, appendix A; S-ORD-01 to S-ORD-05",
     .flags = WEFT_BRDF_RECIPROCAL | WEFT_BRDF_PASSIVE,
     .params = params,
-    .eval = eval,
+    .eval = weft_brdf_eval_ggx_specular,
+    .eval_f32 = weft_brdf_eval_ggx_specular_f32,
     .sample = sample,
     .pdf = pdf,
 };
+
+#endif

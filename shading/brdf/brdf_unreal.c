@@ -1,12 +1,35 @@
-#include "shading/brdf/exp_negative.h"
 #include "shading/brdf/fresnel.h"
+#include "shading/brdf/ggx.h"
 #include "shading/brdf/metallic.h"
-#include "shading/brdf/sampling.h"
 #include "shading/brdf/schlick_smith.h"
 
-#include "core/clones.h"
-
 enum { BASE = 0, METALLIC = 3, ROUGHNESS = 4 }; /* first planes */
+
+/* f = c_diff/pi + D F V1(nl) V1(nv)/4: GGX of roughness^2, Schlick's masking with k = (roughness + 1)^2/8. */
+WEFT_CLONES
+void WEFT_KERNEL(weft_brdf_eval_unreal)(const weft_brdf_batch_real *b, weft_real *const value[3])
+{
+    const weft_real *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
+    const weft_real *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
+    const weft_real *const metallic = b->param[METALLIC], *const roughness = b->param[ROUGHNESS];
+    WEFT_INDEPENDENT
+    for (int i = 0; i < b->n; i++) {
+        const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
+        const weft_real nl = h.lit, k = weft_schlick_k_unreal(roughness[i]);
+        const weft_real d = weft_ggx_d(h.nh, h.s2, roughness[i] * roughness[i]);
+        const weft_real dv = h.valid * d * weft_schlick_v1(nl, k) * weft_schlick_v1(h.nv, k) / 4;
+        const weft_real w = weft_gauss_weight_ue4(h.lh), lit = h.valid / WEFT_PI;
+        for (int c = 0; c < 3; c++) {
+            const weft_real base = b->param[BASE + c][i];
+            const weft_real f0 = weft_metallic_f0(base, metallic[i], WEFT_F0_UNREAL);
+            value[c][i] = lit * weft_metallic_diffuse(base, metallic[i]) + dv * (f0 + (1 - f0) * w);
+        }
+    }
+}
+
+#ifndef WEFT_SINGLE /* what there is once */
+
+#include "shading/brdf/sampling.h"
 
 static const weft_brdf_param params[] = {
     {"base", NULL, 3, 0, 1, 0.5, "", "base colour: diffuse reflectance of dielectrics, F0 of metals"},
@@ -14,34 +37,6 @@ static const weft_brdf_param params[] = {
     {"roughness", NULL, 1, 0.01, 1, 0.5, "", "the artist's roughness; the width of the lobe is its square"},
     {0},
 };
-
-/* Weight of the grazing end in eq. 5, (as weft_fresnel_gauss_ue4() but without a call). */
-WEFT_INLINE double grazing_weight(double lh)
-{
-    return weft_exp_negative(0.69314718055994530942 * (-5.55473 * lh - 6.98316) * lh);
-}
-
-/* f = c_diff/pi + D F V1(nl) V1(nv)/4: GGX of roughness^2, Schlick's masking with k = (roughness + 1)^2/8. */
-WEFT_CLONES
-static void eval(const weft_brdf_batch *b, double *const value[3])
-{
-    const double *const lx = b->light[0], *const ly = b->light[1], *const lz = b->light[2];
-    const double *const vx = b->view[0], *const vy = b->view[1], *const vz = b->view[2];
-    const double *const metallic = b->param[METALLIC], *const roughness = b->param[ROUGHNESS];
-    WEFT_INDEPENDENT
-    for (int i = 0; i < b->n; i++) {
-        const weft_half h = weft_half_of(lx[i], ly[i], lz[i], vx[i], vy[i], vz[i]);
-        const double nl = h.valid > 0 ? h.nl : 1, k = weft_schlick_k_unreal(roughness[i]);
-        const double d = weft_ggx_d(h.nh, h.s2, roughness[i] * roughness[i]);
-        const double dv = h.valid * d * weft_schlick_v1(nl, k) * weft_schlick_v1(h.nv, k) / 4;
-        const double w = grazing_weight(h.lh), lit = h.valid / WEFT_PI;
-        for (int c = 0; c < 3; c++) {
-            const double base = b->param[BASE + c][i];
-            const double f0 = weft_metallic_f0(base, metallic[i], WEFT_F0_UNREAL);
-            value[c][i] = lit * weft_metallic_diffuse(base, metallic[i]) + dv * (f0 + (1 - f0) * w);
-        }
-    }
-}
 
 static double specular_share(const weft_brdf_batch *b, int i)
 {
@@ -74,7 +69,10 @@ const weft_brdf weft_brdf_unreal = {
     .source = "Real Shading in Unreal Engine 4 (Karis 2013) eqs. 1-5; S-UE4-01 to S-UE4-05, S-UE4-12",
     .flags = WEFT_BRDF_RECIPROCAL,
     .params = params,
-    .eval = eval,
+    .eval = weft_brdf_eval_unreal,
+    .eval_f32 = weft_brdf_eval_unreal_f32,
     .sample = sample,
     .pdf = pdf,
 };
+
+#endif

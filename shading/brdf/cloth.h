@@ -11,11 +11,11 @@
  * @param nh  n.h, 0..1
  * @param s2  1 - nh^2; below 1e-7 the exponential has won and the lobe is 0 (S-CNV-02)
  */
-static inline double weft_cloth_rim(double nh, double s2, double alpha)
+WEFT_INLINE weft_real weft_cloth_rim(weft_real nh, weft_real s2, weft_real alpha)
 {
-    const double safe = s2 < 1e-7 ? 1 : s2;
-    const double rim = weft_exp_negative(-nh * nh / (alpha * alpha * safe)) / (safe * safe);
-    return s2 < 1e-7 ? 0 : rim;
+    const weft_real safe = s2 < WEFT_R(1e-7) ? 1 : s2;
+    const weft_real rim = weft_exp_negative(-nh * nh / (alpha * alpha * safe)) / (safe * safe);
+    return s2 < WEFT_R(1e-7) ? 0 : rim;
 }
 
 /**
@@ -25,8 +25,8 @@ static inline double weft_cloth_rim(double nh, double s2, double alpha)
  *
  * @param rim  weft_cloth_rim().  Source: S-ORD-16 (the seed shows two tones and gives no formula).
  */
-static inline double weft_cloth_d_tinted(double rim, double front, double tint, double alpha,
-                                         double amplitude)
+WEFT_INLINE weft_real weft_cloth_d_tinted(weft_real rim, weft_real front, weft_real tint, weft_real alpha,
+                                          weft_real amplitude)
 {
     return (front + tint * amplitude * rim) / (WEFT_PI * (1 + amplitude * alpha * alpha));
 }
@@ -39,15 +39,15 @@ static inline double weft_cloth_d_tinted(double rim, double front, double tint, 
  * @param amplitude  A >= 0, the weight of the rim lobe against the constant offset; the Order uses 4
  * D(0) = 1/(pi(1 + A alpha^2)), D(90 deg) = (1 + A)/(pi(1 + A alpha^2)).  Source: S-ORD-14.
  */
-static inline double weft_cloth_d(double nh, double s2, double alpha, double amplitude)
+WEFT_INLINE weft_real weft_cloth_d(weft_real nh, weft_real s2, weft_real alpha, weft_real amplitude)
 {
     return weft_cloth_d_tinted(weft_cloth_rim(nh, s2, alpha), 1, 1, alpha, amplitude);
 }
 
 /** 1/(4 (nl + nv - nl nv)) in place of G/(4 nl nv): no shadowing term.  nl, nv > 0.  Source: S-ORD-15. */
-static inline double weft_cloth_v(double nl, double nv)
+WEFT_INLINE weft_real weft_cloth_v(weft_real nl, weft_real nv)
 {
-    return 0.25 / (nl + nv - nl * nv);
+    return WEFT_R(0.25) / (nl + nv - nl * nv);
 }
 
 #endif

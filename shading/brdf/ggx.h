@@ -14,9 +14,9 @@
  *            nh^2 (alpha^2 - 1) + 1 loses six digits near nh = 1 at alpha = 1e-3
  * Source: Walter et al. 2007 eq. 33; S-ORD-02, S-CNV-02.
  */
-static inline double weft_ggx_d(double nh, double s2, double alpha)
+WEFT_INLINE weft_real weft_ggx_d(weft_real nh, weft_real s2, weft_real alpha)
 {
-    const double a2 = alpha * alpha, t = a2 * nh * nh + s2;
+    const weft_real a2 = alpha * alpha, t = a2 * nh * nh + s2;
     return a2 / (WEFT_PI * t * t);
 }
 
@@ -27,14 +27,14 @@ static inline double weft_ggx_d(double nh, double s2, double alpha)
  *
  * V1(0) = 1/alpha, V1(1) = 1/2.  Source: S-ORD-04 (the Order's GGX_V1).
  */
-static inline double weft_ggx_v1(double x, double alpha)
+WEFT_INLINE weft_real weft_ggx_v1(weft_real x, weft_real alpha)
 {
-    const double a2 = alpha * alpha;
-    return 1 / (x + sqrt(a2 + (1 - a2) * x * x));
+    const weft_real a2 = alpha * alpha;
+    return 1 / (x + weft_sqrt(a2 + (1 - a2) * x * x));
 }
 
 /** Smith masking, 0..1: G1 = 2 x V1(x).  Source: S-ORD-03. */
-static inline double weft_ggx_g1(double x, double alpha)
+WEFT_INLINE weft_real weft_ggx_g1(weft_real x, weft_real alpha)
 {
     return 2 * x * weft_ggx_v1(x, alpha);
 }
@@ -46,15 +46,15 @@ static inline double weft_ggx_g1(double x, double alpha)
  *
  * Source: Heitz 2014 eq. 99; used to compare (S-ORD-05 uses the separable form).
  */
-static inline double weft_ggx_v_correlated(double nl, double nv, double alpha)
+WEFT_INLINE weft_real weft_ggx_v_correlated(weft_real nl, weft_real nv, weft_real alpha)
 {
-    const double a2 = alpha * alpha;
-    return 0.5 / (nl * sqrt(a2 + (1 - a2) * nv * nv) + nv * sqrt(a2 + (1 - a2) * nl * nl));
+    const weft_real a2 = alpha * alpha;
+    return WEFT_R(0.5) / (nl * weft_sqrt(a2 + (1 - a2) * nv * nv) + nv * weft_sqrt(a2 + (1 - a2) * nl * nl));
 }
 
 /** Widths of the Order's anisotropy, 0..1: along the tangent alpha, along the bitangent
  *  alpha (1 - anisotropy), not below `floor`.  Source: S-ORD-06. */
-static inline double weft_ggx_alpha_b(double alpha, double anisotropy, double floor)
+WEFT_INLINE weft_real weft_ggx_alpha_b(weft_real alpha, weft_real anisotropy, weft_real floor)
 {
     return weft_max(alpha * (1 - anisotropy), floor);
 }
@@ -66,9 +66,9 @@ static inline double weft_ggx_alpha_b(double alpha, double anisotropy, double fl
  *
  * Source: S-ORD-07.
  */
-static inline double weft_ggx_d_aniso(double hx, double hy, double hz, double at, double ab)
+WEFT_INLINE weft_real weft_ggx_d_aniso(weft_real hx, weft_real hy, weft_real hz, weft_real at, weft_real ab)
 {
-    const double x = hx / at, y = hy / ab, t = x * x + y * y + hz * hz;
+    const weft_real x = hx / at, y = hy / ab, t = x * x + y * y + hz * hz;
     return 1 / (WEFT_PI * at * ab * t * t);
 }
 
@@ -77,10 +77,10 @@ static inline double weft_ggx_d_aniso(double hx, double hy, double hz, double at
  * at = ab.  `dz` may be the raised cosine while dx, dy are those of the true direction.
  * Source: S-ORD-07 (the seed prints no shadowing).
  */
-static inline double weft_ggx_v1_aniso(double dx, double dy, double dz, double at, double ab)
+WEFT_INLINE weft_real weft_ggx_v1_aniso(weft_real dx, weft_real dy, weft_real dz, weft_real at, weft_real ab)
 {
-    const double x = at * dx, y = ab * dy;
-    return 1 / (dz + sqrt(x * x + y * y + dz * dz));
+    const weft_real x = at * dx, y = ab * dy;
+    return 1 / (dz + weft_sqrt(x * x + y * y + dz * dz));
 }
 
 #endif

@@ -83,21 +83,42 @@ static void look_up(const weft_merl *merl, const double light[3], const double v
         value[c] = total[c] > 0 ? sum[c] / total[c] : 0;
 }
 
+static void value_at(const weft_merl *merl, const double light[3], double view[3], double f[3])
+{
+    f[0] = f[1] = f[2] = 0;
+    if (view[2] < WEFT_MIN_NV) { /* the limit of a grazing view: the table has nothing below it */
+        const double side = sqrt(view[0] * view[0] + view[1] * view[1]), flat = sqrt(1 - 1e-8);
+        view[0] = side > 0 ? view[0] / side * flat : flat;
+        view[1] = side > 0 ? view[1] / side * flat : 0;
+        view[2] = WEFT_MIN_NV;
+    }
+    if (light[2] > 0)
+        look_up(merl, light, view, f);
+}
+
 static void eval(const weft_brdf_batch *b, double *const value[3])
 {
     for (int i = 0; i < b->n; i++) {
         const double light[3] = {b->light[0][i], b->light[1][i], b->light[2][i]};
-        double view[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, f[3] = {0};
-        if (view[2] < WEFT_MIN_NV) { /* the limit of a grazing view: the table has nothing below it */
-            const double side = sqrt(view[0] * view[0] + view[1] * view[1]), flat = sqrt(1 - 1e-8);
-            view[0] = side > 0 ? view[0] / side * flat : flat;
-            view[1] = side > 0 ? view[1] / side * flat : 0;
-            view[2] = WEFT_MIN_NV;
-        }
-        if (light[2] > 0)
-            look_up(b->data, light, view, f);
+        double view[3] = {b->view[0][i], b->view[1][i], b->view[2][i]}, f[3];
+        value_at(b->data, light, view, f);
         for (int c = 0; c < 3; c++)
             value[c][i] = f[c];
+    }
+}
+
+/* A look-up gains nothing from single precision; only the arrays have it. */
+static void eval_f32(const weft_brdf_batch_f32 *b, float *const value[3])
+{
+    for (int i = 0; i < b->n; i++) {
+        double light[3], view[3], f[3];
+        for (int c = 0; c < 3; c++) {
+            light[c] = (double)b->light[c][i];
+            view[c] = (double)b->view[c][i];
+        }
+        value_at(b->data, light, view, f);
+        for (int c = 0; c < 3; c++)
+            value[c][i] = (float)f[c];
     }
 }
 
@@ -111,6 +132,7 @@ void weft_merl_make_model(weft_merl *merl)
         .params = no_params,
         .data = merl,
         .eval = eval,
+        .eval_f32 = eval_f32,
         .sample = weft_brdf_sample_cosine,
         .pdf = weft_brdf_pdf_cosine,
     };

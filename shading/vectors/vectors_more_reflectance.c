@@ -81,7 +81,7 @@ static void blinn_phong(int n, const double *const *in, double *const *out)
         const double power = weft_blinn_phong_power(in[0][i]), k = weft_schlick_k_power(power);
         out[0][i] = power;
         out[1][i] = k;
-        out[2][i] = weft_blinn_phong_d(h.s2, power) / 4;
+        out[2][i] = weft_blinn_phong_d(h.nh, h.s2, power) / 4;
         out[3][i] = weft_schlick_v1(h.nl, k) * weft_schlick_v1(h.nv, k);
         out[4][i] = weft_fresnel_schlick(f0, h.lh);
         out[5][i] = weft_fresnel_gauss_fc3(f0, h.lh);
@@ -108,11 +108,11 @@ static void cook_torrance(int n, const double *const *in, double *const *out)
         const weft_half h = weft_vectors_half(in[2][i], in[3][i], in[4][i]);
         int column = 0;
         for (int d = 0; d < WEFT_CT_D_COUNT; d++)
-            out[column++][i] = weft_ct_d((weft_ct_distribution)d, &h, in[0][i]);
+            out[column++][i] = weft_ct_d(d, &h, in[0][i]);
         for (int g = 0; g < WEFT_CT_G_COUNT; g++)
-            out[column++][i] = weft_ct_g((weft_ct_masking)g, &h, in[0][i]);
+            out[column++][i] = weft_ct_v(g, &h, in[0][i]) * h.nl * h.nv;
         for (int f = 0; f < WEFT_CT_F_COUNT; f++)
-            out[column++][i] = weft_ct_f((weft_ct_fresnel)f, in[1][i], h.lh);
+            out[column++][i] = weft_ct_f(f, in[1][i], &h);
     }
 }
 

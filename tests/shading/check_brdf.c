@@ -47,7 +47,7 @@ static void test_table_is_sound(void **state)
         assert_ok(weft_brdf_find(brdf->name, &found, err));
         assert_ptr_equal(found, brdf); /* names are unique */
         assert_true(weft_brdf_n_planes(brdf) <= WEFT_BRDF_MAX_PLANES);
-        assert_true(brdf->summary && brdf->source && brdf->eval && brdf->params);
+        assert_true(brdf->summary && brdf->source && brdf->eval && brdf->eval_f32 && brdf->params);
         assert_int_equal(brdf->sample == NULL, brdf->pdf == NULL);
         for (const weft_brdf_param *p = brdf->params; p->name; p++) {
             assert_true(p->components == 1 || p->components == 3);
@@ -152,6 +152,119 @@ static void test_arrays_give_what_single_evaluations_give(void **state)
                 assert_true(f[c][n] == -7);
             }
         }
+    }
+}
+
+/* Likewise in single precision. */
+static void test_single_precision_loops_give_what_single_evaluations_give(void **state)
+{
+    (void)state;
+    enum { N = 67 };
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        float l[3][N], v[3][N], f[3][N + 1], params[WEFT_BRDF_MAX_PLANES][N], alone[N][3];
+        for (int i = 0; i < N; i++) {
+            double values[WEFT_BRDF_MAX_PLANES], light[3], view[3];
+            float *const out[3] = {&alone[i][0], &alone[i][1], &alone[i][2]};
+            weft_brdf_batch_f32 one = {.n = 1};
+            random_values(*b, &random, values);
+            random_direction(&random, -0.2, light);
+            random_direction(&random, -0.2, view);
+            for (int c = 0; c < 3; c++) {
+                l[c][i] = (float)light[c];
+                v[c][i] = (float)view[c];
+                one.light[c] = &l[c][i];
+                one.view[c] = &v[c][i];
+            }
+            for (int k = 0; k < weft_brdf_n_planes(*b); k++) {
+                params[k][i] = (float)values[k];
+                one.param[k] = &params[k][i];
+            }
+            (*b)->eval_f32(&one, out);
+        }
+        for (int n = 0; n <= N; n++) {
+            weft_brdf_batch_f32 batch = {.n = n, .light = {l[0], l[1], l[2]}, .view = {v[0], v[1], v[2]}};
+            float *const out[3] = {f[0], f[1], f[2]};
+            for (int k = 0; k < weft_brdf_n_planes(*b); k++)
+                batch.param[k] = params[k];
+            f[0][n] = f[1][n] = f[2][n] = -7;
+            (*b)->eval_f32(&batch, out);
+            for (int c = 0; c < 3; c++) {
+                for (int i = 0; i < n; i++)
+                    assert_true(f[c][i] == alone[i][c]);
+                assert_true(f[c][n] == -7);
+            }
+        }
+    }
+}
+
+static void round_all(const double *from, int n, float *rounded, double *back)
+{
+    for (int i = 0; i < n; i++) {
+        volatile float through_memory = (float)from[i]; /* gcc 12 drops the rounding of pairs otherwise */
+        rounded[i] = through_memory;
+        back[i] = (double)through_memory;
+    }
+}
+
+/* Largest difference of the two precisions at the same arguments, as a share of what brdf.h allows. */
+static double single_share(const weft_brdf *brdf, const double values[], const double l[3], const double v[3])
+{
+    float l32[3], v32[3], params32[WEFT_BRDF_MAX_PLANES], f32[3];
+    double l64[3], v64[3], params64[WEFT_BRDF_MAX_PLANES], f[3], worst = 0;
+    float *const out[3] = {&f32[0], &f32[1], &f32[2]};
+    weft_brdf_batch_f32 batch = {.n = 1};
+    round_all(l, 3, l32, l64);
+    round_all(v, 3, v32, v64);
+    round_all(values, weft_brdf_n_planes(brdf), params32, params64);
+    for (int c = 0; c < 3; c++) {
+        batch.light[c] = &l32[c];
+        batch.view[c] = &v32[c];
+    }
+    for (int k = 0; k < weft_brdf_n_planes(brdf); k++)
+        batch.param[k] = &params32[k];
+    brdf->eval_f32(&batch, out);
+    weft_brdf_eval_one(brdf, params64, l64, v64, f);
+    for (int c = 0; c < 3; c++) {
+        const double share = fabs((double)f32[c] - f[c]) / (1e-6 + 1e-5 * f[c]);
+        if (!isfinite(f32[c]) || f32[c] < 0 || (l32[2] <= 0 && f32[c] != 0) || !(share <= 1))
+            fail_msg(
+                "%s is %.9g in single precision and %.17g in double (share %g) at l %.17g %.17g %.17g, v "
+                "%.17g %.17g %.17g, parameters %g %g %g %g %g %g %g %g",
+                brdf->name, (double)f32[c], f[c], share, l64[0], l64[1], l64[2], v64[0], v64[1], v64[2],
+                params64[0], params64[1], params64[2], params64[3], params64[4], params64[5], params64[6],
+                params64[7]);
+        worst = fmax(worst, share);
+    }
+    return worst;
+}
+
+/* The same arguments in both precisions over the whole domain, both ends of the parameters included. */
+static void test_single_precision_follows_double(void **state)
+{
+    (void)state;
+    static const double cosines[] = {1, 0.9999999, 0.999, 0.5, 1e-3, 1e-4, 1e-9, 0, -1e-9, -0.5, -1};
+    enum { N = sizeof cosines / sizeof cosines[0] };
+    uint64_t random = SEED;
+    for (const weft_brdf *const *b = weft_brdfs; *b; b++) {
+        double values[WEFT_BRDF_MAX_PLANES], l[3], v[3], worst = 0;
+        for (int i = 0; i < 20000; i++) {
+            random_values(*b, &random, values);
+            random_direction(&random, -1, l);
+            random_direction(&random, i % 2 ? -1 : 0, v);
+            const double opposite[3] = {-l[0], -l[1], -l[2]}, mirror[3] = {-l[0], -l[1], l[2]};
+            worst = fmax(worst, single_share(*b, values, l, v));
+            worst = fmax(worst, single_share(*b, values, l, l));
+            worst = fmax(worst, single_share(*b, values, l, opposite));
+            worst = fmax(worst, single_share(*b, values, l, mirror));
+        }
+        for (int i = 0; i < N * N * 8; i++) {
+            random_values(*b, &random, values);
+            weft_brdf_direction(cosines[i % N], 0, l);
+            weft_brdf_direction(cosines[i / N % N], i / (N * N) * WEFT_PI / 4, v);
+            worst = fmax(worst, single_share(*b, values, l, v));
+        }
+        print_message("  %-20s largest difference %.2f of 1e-5 f + 1e-6\n", (*b)->name, worst);
     }
 }
 
@@ -466,6 +579,8 @@ int main(void)
         cmocka_unit_test(test_values_are_finite_and_not_negative),
         cmocka_unit_test(test_reciprocity),
         cmocka_unit_test(test_arrays_give_what_single_evaluations_give),
+        cmocka_unit_test(test_single_precision_loops_give_what_single_evaluations_give),
+        cmocka_unit_test(test_single_precision_follows_double),
         cmocka_unit_test(test_furnace),
         cmocka_unit_test(test_density_integrates_to_one),
         cmocka_unit_test(test_normal_distributions_integrate_to_one),

@@ -2,6 +2,7 @@
 #include "calibration/charts/colour_vectors.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "shading/vectors/vectors_single.h"
 #include "shading/vectors/vectors_tables.h"
 
 #include <dirent.h>
@@ -48,6 +49,31 @@ static bool print_columns(const weft_vectors_column *columns, int n, double rtol
     return good;
 }
 
+/* A row for each model whose evaluation in single precision gives columns of the table. */
+static bool print_single(const weft_csv *csv, const char *stem, const char *path, weft_error *err)
+{
+    bool good = true;
+    for (const weft_vectors_single *s = weft_vectors_singles; s->stem; s++) {
+        weft_vectors_single_result r;
+        if (strcmp(s->stem, stem) != 0)
+            continue;
+        if (weft_vectors_single_run(s, csv, path, &r, err) != WEFT_OK) {
+            fprintf(stderr, "weft-vectors: %s\n", err->text);
+            return false;
+        }
+        const bool within = r.worst_share <= 1;
+        printf(
+            "  %-20s single precision: rel %.2e, %.2e of double at the same arguments  (rtol %.0e, %.1e of "
+            "what is allowed)%s\n",
+            s->brdf, r.table_rel, r.kernel_rel, WEFT_VECTORS_SINGLE_RTOL, r.worst_share,
+            within ? "" : "  FAILED");
+        if (!within)
+            printf("    row %d: got %.9g, wanted %.17g\n", r.worst_row, r.worst_got, r.worst_want);
+        good &= within;
+    }
+    return good;
+}
+
 static void run_file(const char *path, tally *count)
 {
     char stem[128];
@@ -71,7 +97,9 @@ static void run_file(const char *path, tally *count)
         status = weft_vectors_run(model, &csv, path, rtol, columns, &n_columns, &error);
         if (status == WEFT_OK) {
             printf("%s: %d rows (%s)\n", stem, csv.rows, model->ids);
-            *(print_columns(columns, n_columns, rtol) ? &count->passed : &count->failed) += 1;
+            const bool precise = print_columns(columns, n_columns, rtol);
+            const bool single = print_single(&csv, stem, path, &error);
+            *(precise && single ? &count->passed : &count->failed) += 1;
         }
         weft_csv_fini(&csv);
     }
@@ -111,7 +139,8 @@ int main(int argc, char **argv)
             argc < 2 ? stderr : stdout,
             "usage: weft-vectors DIR|FILE...\n\nCompares tables of reference values (NAME.csv with columns "
             "out_*) with the function NAME of this build;\nexits 1 when a value is off by more than 1e-12 "
-            "+ rtol |wanted|, rtol from MANIFEST.csv beside the table.\n");
+            "+ rtol |wanted|, rtol from MANIFEST.csv beside the table,\nor in single precision by more than "
+            "1e-5 at the rounded arguments.\n");
         return argc < 2 ? 2 : 0;
     }
     for (int i = 1; i < argc; i++) {
