@@ -102,6 +102,16 @@ enum MHD_Result weft_reply(weft_http_request *request, unsigned status, struct M
 /** The text of an error, without any connection, for one that has sent no request; free(). */
 char *weft_reply_text(unsigned status, const char *code, const char *message);
 
+/* -- http_refuse.c */
+
+/** MHD_queue_response() of the library, for answers of ours; one that is called by that name is the library's
+ *  own and is replaced. */
+enum MHD_Result weft_http_queue(struct MHD_Connection *mhd, unsigned status, struct MHD_Response *response);
+/** Answers past the library, for a client that has no request that could be answered, and hangs up.  Under
+ *  TLS it is only hung up on. */
+void weft_http_turn_away(weft_http_connection *connection, unsigned status, const char *code,
+                         const char *message);
+
 /* -- http_request.c: callbacks of libmicrohttpd */
 
 enum MHD_Result weft_http_handle(void *listener, struct MHD_Connection *mhd, const char *url,

@@ -13,7 +13,7 @@ enum MHD_Result weft_reply(weft_http_request *request, unsigned status, struct M
         MHD_add_response_header(response, "Content-Type", type);
     MHD_add_response_header(response, "Cache-Control", "no-store");
     MHD_add_response_header(response, "X-Content-Type-Options", "nosniff");
-    const enum MHD_Result result = MHD_queue_response(request->mhd, status, response);
+    const enum MHD_Result result = weft_http_queue(request->mhd, status, response);
     MHD_destroy_response(response);
     request->answered = true;
     return result;

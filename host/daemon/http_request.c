@@ -83,7 +83,7 @@ bool weft_http_query_int(weft_http_request *request, const char *key, int min, i
 typedef struct header_sum {
     int n;
     size_t bytes;
-    int n_hosts;
+    int n_hosts, n_lengths, n_encodings;
 } header_sum;
 
 static enum MHD_Result add_header(void *context, enum MHD_ValueKind kind, const char *key, const char *value)
@@ -93,6 +93,8 @@ static enum MHD_Result add_header(void *context, enum MHD_ValueKind kind, const 
     sum->n++;
     sum->bytes += strlen(key) + (value ? strlen(value) : 0) + 4;
     sum->n_hosts += strcasecmp(key, "Host") == 0;
+    sum->n_lengths += strcasecmp(key, "Content-Length") == 0;
+    sum->n_encodings += strcasecmp(key, "Transfer-Encoding") == 0;
     return MHD_YES;
 }
 
@@ -235,15 +237,34 @@ static enum MHD_Result judge(weft_http_request *r, const char *method)
     return check_body(r, &result) ? r->route->answer(r) : result;
 }
 
+/* Where the body ends must be said once and so that everybody understands the same: a proxy in front of this
+ * server would else see other requests than it does (RFC 9112, 6.1 and 6.3). */
+static bool check_framing(weft_http_request *r, enum MHD_Result *result)
+{
+    header_sum sum = {0};
+    MHD_get_connection_values(r->mhd, MHD_HEADER_KIND, add_header, &sum);
+    const char *const encoding = header_of(r, "Transfer-Encoding");
+    if (sum.n_lengths + sum.n_encodings > 1)
+        *result = weft_reply_problem(r, 400, "bad_http", "the length of the body is said twice");
+    else if (encoding && strcasecmp(encoding, "chunked") != 0)
+        *result = weft_reply_problem(r, 501, "not_implemented", "Transfer-Encoding: only chunked is known");
+    else
+        return true;
+    return false;
+}
+
 /* The headers are here.  Nothing is refused before the body has come too, so that a client that is still
  * sending hears why; but a body that would take long is not waited for. */
 static enum MHD_Result begin_request(weft_http_request *r, const char *url)
 {
     const char *const length = header_of(r, "Content-Length");
     const long n = length ? strlen(length) > 9 ? LONG_MAX : strtol(length, NULL, 10) : 0;
+    enum MHD_Result refused;
     r->url = weft_strdup(url, NULL);
     if (!r->url)
         return MHD_NO;
+    if (!check_framing(r, &refused))
+        return refused;
     r->too_large = n > WEFT_JOB_REQUEST_MAX;
     return n > SWALLOWED ? refuse_size(r) : MHD_YES;
 }

@@ -40,23 +40,6 @@ void weft_http_server_destroy(weft_http_server *server)
 
 /* ---- connections ---- */
 
-/* For a client that has no request that could be answered.  Under TLS it is only hung up on. */
-static void turn_away(const weft_http_connection *c, unsigned status, const char *words, const char *code,
-                      const char *message)
-{
-    char *const body = weft_reply_text(status, code, message);
-    char text[1024];
-    if (body && !c->listener->tls) {
-        const int n = snprintf(text, sizeof text,
-                               "HTTP/1.1 %u %s\r\nContent-Type: application/json\r\nContent-Length: %zu\r\n"
-                               "Connection: close\r\n\r\n%s",
-                               status, words, strlen(body), body);
-        (void)!send(c->fd, text, (size_t)n, MSG_DONTWAIT | MSG_NOSIGNAL);
-    }
-    free(body);
-    (void)shutdown(c->fd, SHUT_RDWR); /* libmicrohttpd closes it when it notices */
-}
-
 static void identify(weft_http_connection *c)
 {
     struct ucred peer = {.uid = (uid_t)-1};
@@ -90,8 +73,7 @@ static void begin_connection(weft_http_listener *listener, struct MHD_Connection
         c->next->link = &c->next;
     server->connections = c;
     if (++server->n_connections > WEFT_HTTP_CONNECTIONS)
-        turn_away(c, 503, "Service Unavailable", "too_many_connections",
-                  "too many connections; try again later");
+        weft_http_turn_away(c, 503, "too_many_connections", "too many connections; try again later");
 }
 
 static void on_connection(void *context, struct MHD_Connection *mhd, void **socket_context,
@@ -117,8 +99,7 @@ static void end_slow_requests(weft_http_server *server, double now_s)
     for (weft_http_connection *c = server->connections; c; c = next) {
         next = c->next;
         if (c->waiting_s > 0 && now_s - c->waiting_s > WEFT_HTTP_REQUEST_S) {
-            c->waiting_s = 0;
-            turn_away(c, 408, "Request Timeout", "too_slow", "the request did not come in time");
+            weft_http_turn_away(c, 408, "too_slow", "the request did not come in time");
         }
     }
 }
@@ -189,8 +170,7 @@ weft_err weft_http_server_listen(weft_http_server *server, int fd, bool tcp, wef
         MHD_OPTION_NOTIFY_COMPLETED, weft_http_completed, l, MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
         MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         (size_t)CONNECTION_MEMORY, MHD_OPTION_CONNECTION_LIMIT, (unsigned)(WEFT_HTTP_CONNECTIONS + 64),
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_TIMEOUT_S, MHD_OPTION_STRICT_FOR_CLIENT, 1,
-        MHD_OPTION_ARRAY, tls, MHD_OPTION_END);
+        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_TIMEOUT_S, MHD_OPTION_ARRAY, tls, MHD_OPTION_END);
     const union MHD_DaemonInfo *const info =
         l->mhd ? MHD_get_daemon_info(l->mhd, MHD_DAEMON_INFO_EPOLL_FD) : NULL;
     if (!info) {

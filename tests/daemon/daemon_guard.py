@@ -93,15 +93,19 @@ def test_tcp_wants_the_token():
         d.start()
 
 
+def make_certificate(folder):
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{folder}/key", "-out",
+                    f"{folder}/cert", "-days", "1", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"],
+                   check=True, capture_output=True)
+
+
 def test_tls():
     if not shutil.which("openssl"):
         print("skipped: no openssl to make a certificate")
         return
     port = free_port()
     with scratch() as folder:
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{folder}/key", "-out",
-                        f"{folder}/cert", "-days", "1", "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"],
-                       check=True, capture_output=True)
+        make_certificate(folder)
         with Weftd(folder, "--listen", f"127.0.0.1:{port}", "--tls-cert", f"{folder}/cert", "--tls-key",
                    f"{folder}/key") as d:
             with open(f"{d.library}/.weft/token", encoding="utf-8") as file:
@@ -215,6 +219,92 @@ def test_requests_that_are_none():
         got = raw(d, f"GET /v1 HTTP/1.0\r\nHost: localhost\r\n{vast}\r\n".encode())
         assert b" 431 " in got or not got, got[:100]  # hung up on before all of it has come
         assert d.get("/v1").status == 200
+
+
+def odd_requests():
+    """(name, bytes, status, code) of what is refused before it is a request of ours, much of it by libmicrohttpd."""
+    get, post = b"GET /v1 HTTP/1.1\r\nHost: localhost\r\n", b"POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\n"
+    chunked = post + b"Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    bad, large = (400, "bad_http"), (413, "body_too_large")
+    yield "no version", b"GET /v1\r\n\r\n", *bad
+    yield "words", b"HELLO there\r\n\r\n", *bad
+    yield "high bytes", b"\xff\xfe\xfd / \xff\r\n\r\n", *bad
+    yield "HTTP/9.9", b"GET /v1 HTTP/9.9\r\nHost: localhost\r\n\r\n", 505, "http_version"
+    yield "HTTP/0.9", b"GET /v1 HTTP/0.9\r\nHost: localhost\r\n\r\n", 505, "http_version"
+    yield "HTTP/2", b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505, "http_version"
+    yield "no Host", b"GET /v1 HTTP/1.1\r\nConnection: close\r\n\r\n", 421, "foreign_host"
+    yield "a blank in the address", b"GET /v1 x HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", 404, "no_such_path"
+    yield "no colon", get + b"no colon here\r\n\r\n", *bad
+    for length in (b"x", b"-1", b"5x", b"", b"0x10", b"1.5"):
+        yield f"Content-Length: {length}", post + b"Content-Length: " + length + b"\r\n\r\nabcde", *bad
+    yield "Content-Length: 9...", post + b"Content-Length: " + b"9" * 24 + b"\r\n\r\n", *large
+    yield "two lengths", post + b"Content-Length: 5\r\nContent-Length: 6\r\n\r\nabcdef", *bad
+    yield "length and chunks", post + b"Content-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", *bad
+    yield "gzip", post + b"Transfer-Encoding: gzip\r\n\r\n", 501, "not_implemented"
+    for chunk in (b"zz\r\nab\r\n", b"-1\r\nab\r\n", b"2\r\nabXX0\r\n\r\n"):
+        yield f"chunk {chunk}", chunked + chunk, *bad
+    yield "endless chunk", chunked + b"f" * 20 + b"\r\nab\r\n", *large
+    yield "long address", b"GET /" + b"a" * 70000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n", 414, "uri_too_long"
+    yield "long header", get + b"X: " + b"y" * 70000 + b"\r\n\r\n", 431, "headers_too_large"
+    yield "cookies", get + b"Cookie: " + b";".join(b"a%d=b" % i for i in range(1500)) + b"\r\n\r\n", 431, "headers_too_large"
+    yield "arguments", (b"GET /v1?" + b"&".join(b"a%d=b" % i for i in range(1500)) +
+                        b" HTTP/1.1\r\nHost: localhost\r\n\r\n"), 431, "headers_too_large"
+
+
+def test_every_refusal_is_json():
+    """On the socket and over TCP, also as the second request of a connection; under TLS as far as it can be."""
+    def ask(s, data):
+        got = b""
+        s.settimeout(25 * SLOW)
+        try:
+            s.sendall(data)
+        except OSError:  # it has heard enough, and hung up; what it said is there
+            pass
+        try:
+            while chunk := s.recv(65536):
+                got += chunk
+        except OSError:
+            pass
+        s.close()
+        return got
+
+    def local(d):
+        s = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        s.connect(d.socket)
+        return s
+
+    def over(port, context=None):
+        s = socket.create_connection(("127.0.0.1", port))
+        return context.wrap_socket(s, server_hostname="localhost") if context else s
+    first = b"GET /v1 HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    port, tls_port = free_port(), free_port()
+    with scratch() as folder:
+        for name in ("plain", "tls"):
+            os.makedirs(f"{folder}/{name}")
+        with Weftd(f"{folder}/plain", "--listen", f"127.0.0.1:{port}") as d:
+            for name, data, *wanted in odd_requests():
+                assert list(code_of(ask(local(d), data))) == wanted, name
+                if len(data) < 5000:  # what is not read when the connection ends makes TCP forget the answer
+                    got = ask(over(port), data)
+                    assert b"application/json" in got and b"<html" not in got, (name, got)
+                s = local(d)
+                s.sendall(first)
+                assert s.recv(65536).startswith(b"HTTP/1.1 200 "), name
+                assert list(code_of(ask(s, data))) == wanted, f"{name}, as a second request"
+            for data in (b"GET\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n"):  # no request line: only hung up on
+                assert ask(local(d), data) == b""
+            assert d.get("/v1").status == 200
+        if not shutil.which("openssl"):
+            return
+        make_certificate(folder)
+        with Weftd(f"{folder}/tls", "--listen", f"127.0.0.1:{tls_port}", "--tls-cert", f"{folder}/cert", "--tls-key",
+                   f"{folder}/key") as d:
+            context = ssl.create_default_context(cafile=f"{folder}/cert")
+            for name, data, *_ in odd_requests():
+                if len(data) < 5000:
+                    got = ask(over(tls_port, context), data)
+                    assert got == b"" if "Content-Length:" in name else code_of(got), (name, got)
+            assert d.get("/v1").status == 200
 
 
 def test_slow_loris():
