@@ -122,7 +122,7 @@ static void eval_f32(const weft_brdf_batch_f32 *b, float *const value[3])
     }
 }
 
-void weft_merl_make_model(weft_merl *merl)
+static void make_model(weft_merl *merl)
 {
     merl->brdf = (weft_brdf){
         .name = merl->name,
@@ -136,6 +136,27 @@ void weft_merl_make_model(weft_merl *merl)
         .sample = weft_brdf_sample_cosine,
         .pdf = weft_brdf_pdf_cosine,
     };
+}
+
+weft_err weft_merl_create(const int size[3], const char *name, weft_merl **merl, weft_error *err)
+{
+    weft_merl *const new = weft_alloc(1, sizeof *new, err);
+    const size_t cells = weft_merl_cells(size);
+    bool made = new && (new->name = weft_strdup(name, err));
+    for (int k = 0; k < 3 && made; k++) {
+        new->size[k] = size[k];
+        new->value[k] = weft_alloc(cells, sizeof(double), err);
+        made = new->value[k] != NULL;
+        for (size_t i = 0; i < cells && made; i++)
+            new->value[k][i] = -1;
+    }
+    if (!made) {
+        weft_merl_destroy(new);
+        return WEFT_ERR_NOMEM;
+    }
+    make_model(new);
+    *merl = new;
+    return WEFT_OK;
 }
 
 void weft_merl_destroy(weft_merl *merl)

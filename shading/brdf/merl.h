@@ -17,6 +17,7 @@
 
 #include "shading/brdf/brdf.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /** Cells of the database's files along theta_h, theta_d and phi_d; also what Weft writes. */
@@ -62,8 +63,20 @@ void weft_merl_angles(const double light[3], const double view[3], double *theta
  */
 weft_err weft_merl_read(const char *path, weft_merl **merl, weft_error *err);
 
-/** Makes merl->brdf of the other members, for a table that was filled in memory. */
-void weft_merl_make_model(weft_merl *merl);
+/** A table of `size` cells, all marked as not measured, to fill and save.  weft_merl_destroy() it. */
+weft_err weft_merl_create(const int size[3], const char *name, weft_merl **merl, weft_error *err);
+
+/** Writes a table as it is; what is below 0 as -1.  @return WEFT_ERR_IO, WEFT_ERR_NOMEM */
+weft_err weft_merl_save(const char *path, const weft_merl *merl, weft_error *err);
+
+/**
+ * Light and view that stand for a cell: its middle, or where that lies below the horizon the first place
+ * above it on the way to the cell's highest corner (the smallest angles, phi_d next to 90 degrees).
+ *
+ * @param cell  along theta_h, theta_d, phi_d
+ * @return false where all of the cell is below
+ */
+bool weft_merl_cell(const int size[3], const int cell[3], double light[3], double view[3]);
 
 /** Frees it; NULL is fine. */
 void weft_merl_destroy(weft_merl *merl);

@@ -61,55 +61,59 @@ static weft_err read_colour(const char *path, const char *bytes, int colour, wef
     return WEFT_OK;
 }
 
-static weft_err read_bytes(const char *path, const char *bytes, size_t n, weft_merl *merl, weft_error *err)
-{
-    bool any = false;
-    WEFT_TRY(read_header(path, bytes, n, merl->size, err));
-    if (!(merl->name = weft_strdup(weft_path_name(path), err)))
-        return WEFT_ERR_NOMEM;
-    for (int c = 0; c < 3; c++) {
-        if (!(merl->value[c] = weft_alloc(weft_merl_cells(merl->size), sizeof(double), err)))
-            return WEFT_ERR_NOMEM;
-        WEFT_TRY(read_colour(path, bytes, c, merl, &any, err));
-    }
-    return any ? WEFT_OK
-               : weft_fail(err, WEFT_ERR_FORMAT, "%s: all its cells are marked as not measured", path);
-}
-
 weft_err weft_merl_read(const char *path, weft_merl **merl, weft_error *err)
 {
     const size_t limit = HEADER_BYTES + 3 * sizeof(double) * (size_t)WEFT_MERL_MAX_CELLS;
     char *bytes = NULL;
     size_t n = 0;
+    int size[3];
+    bool any = false;
+    weft_merl *new = NULL;
     WEFT_TRY(weft_file_read(path, limit, &bytes, &n, err));
-    weft_merl *const new = weft_alloc(1, sizeof *new, err);
-    const weft_err status = new ? read_bytes(path, bytes, n, new, err) : WEFT_ERR_NOMEM;
+    weft_err status = read_header(path, bytes, n, size, err);
+    if (status == WEFT_OK)
+        status = weft_merl_create(size, weft_path_name(path), &new, err);
+    for (int c = 0; c < 3 && status == WEFT_OK; c++)
+        status = read_colour(path, bytes, c, new, &any, err);
+    if (status == WEFT_OK && !any)
+        status = weft_fail(err, WEFT_ERR_FORMAT, "%s: all its cells are marked as not measured", path);
     weft_free(bytes);
-    if (status != WEFT_OK) {
+    if (status == WEFT_OK)
+        *merl = new;
+    else
         weft_merl_destroy(new);
-        return status;
-    }
-    weft_merl_make_model(new);
-    *merl = new;
-    return WEFT_OK;
+    return status;
 }
 
 /* ---- writing ---- */
 
-typedef struct fill_job {
-    const weft_brdf *brdf;
-    const double *values;
-    double *to; /* [3][N_CELLS], scaled */
-} fill_job;
-
-/* Light and view at a place in cell (h, d, p), half vector over azimuth `turn_rad`.  `t` 0 is the middle, 1
- * the corner farthest above the horizon: the smallest angles of the cell, phi_d next to 90 degrees. */
-static void cell_directions(int h, int d, int p, double t, double turn_rad, double light[3], double view[3])
+weft_err weft_merl_save(const char *path, const weft_merl *merl, weft_error *err)
 {
-    const double back = 0.5 * (1 - t), across = p < WEFT_MERL_PHI_D / 2 ? 1 - back : back;
-    const double root = (h + back) / WEFT_MERL_THETA_H, quarter = WEFT_PI / 2;
-    weft_merl_directions(quarter * root * root, quarter * (d + back) / WEFT_MERL_THETA_D,
-                         WEFT_PI * (p + across) / WEFT_MERL_PHI_D, light, view);
+    const int32_t header[3] = {merl->size[0], merl->size[1], merl->size[2]};
+    const size_t cells = weft_merl_cells(merl->size), n = HEADER_BYTES + 3 * sizeof(double) * cells;
+    char *const bytes = weft_alloc(n, 1, err);
+    if (!bytes)
+        return WEFT_ERR_NOMEM;
+    char *to = bytes + HEADER_BYTES;
+    memcpy(bytes, header, HEADER_BYTES);
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < cells; i++, to += sizeof(double)) {
+            const double f = merl->value[c][i], stored = f >= 0 ? f / weft_merl_scale[c] : -1;
+            memcpy(to, &stored, sizeof stored);
+        }
+    const weft_err status = weft_file_write(path, bytes, n, err);
+    weft_free(bytes);
+    return status;
+}
+
+/* `t` of weft_merl_cell(): 0 is the middle, 1 the corner; the half vector lies over azimuth `turn_rad`. */
+static void directions_in(const int size[3], const int cell[3], double t, double turn_rad, double light[3],
+                          double view[3])
+{
+    const double back = 0.5 * (1 - t), across = 2 * cell[2] + 1 < size[2] ? 1 - back : back;
+    const double root = (cell[0] + back) / size[0], quarter = WEFT_PI / 2;
+    weft_merl_directions(quarter * root * root, quarter * (cell[1] + back) / size[1],
+                         WEFT_PI * (cell[2] + across) / size[2], light, view);
     double *const both[] = {light, view};
     for (int k = 0; k < 2; k++) {
         const double x = both[k][0], y = both[k][1];
@@ -118,46 +122,53 @@ static void cell_directions(int h, int d, int p, double t, double turn_rad, doub
     }
 }
 
-/* The place of a cell that stands for it: the middle, or the first above the horizon on the way to its
- * highest corner.  False where all of it is below. */
-static bool choose_directions(int h, int d, int p, double light[3], double view[3])
+bool weft_merl_cell(const int size[3], const int cell[3], double light[3], double view[3])
 {
     for (int k = 0; k <= 8; k++) {
-        cell_directions(h, d, p, 0.999 * k / 8, 0, light, view);
+        directions_in(size, cell, 0.999 * k / 8, 0, light, view);
         if (light[2] > 0 && view[2] > 0)
             return true;
     }
     return false;
 }
 
+typedef struct fill_job {
+    const weft_brdf *brdf;
+    const double *values;
+    weft_merl *to;
+} fill_job;
+
 static void fill_rows(void *context, int band, int row_begin, int row_end)
 {
     const fill_job *const job = context;
+    weft_merl *const to = job->to;
     (void)band;
     for (int row = row_begin; row < row_end; row++)
-        for (int p = 0; p < WEFT_MERL_PHI_D; p++) {
+        for (int p = 0; p < to->size[2]; p++) {
+            const int cell[3] = {row / to->size[1], row % to->size[1], p};
             double light[3], view[3], f[3];
-            const size_t index = (size_t)row * WEFT_MERL_PHI_D + (size_t)p;
-            const bool above =
-                choose_directions(row / WEFT_MERL_THETA_D, row % WEFT_MERL_THETA_D, p, light, view);
-            if (above)
-                weft_brdf_eval_one(job->brdf, job->values, light, view, f);
+            if (!weft_merl_cell(to->size, cell, light, view))
+                continue;
+            weft_brdf_eval_one(job->brdf, job->values, light, view, f);
             for (int c = 0; c < 3; c++)
-                job->to[(size_t)c * N_CELLS + index] = above ? f[c] / weft_merl_scale[c] : -1;
+                to->value[c][(size_t)row * (size_t)to->size[2] + (size_t)p] = f[c];
         }
 }
+
+static const int database_size[3] = {WEFT_MERL_THETA_H, WEFT_MERL_THETA_D, WEFT_MERL_PHI_D};
 
 /* Whether the value stays when the surface is turned under light and view. */
 static weft_err check_isotropic(const weft_brdf *brdf, const double *values, weft_error *err)
 {
     enum { STEP = 9 };
-    for (int h = 0; h < WEFT_MERL_THETA_H; h += STEP)
-        for (int d = 0; d < WEFT_MERL_THETA_D; d += STEP)
-            for (int p = 0; p < WEFT_MERL_PHI_D; p += STEP) {
+    int cell[3];
+    for (cell[0] = 0; cell[0] < WEFT_MERL_THETA_H; cell[0] += STEP)
+        for (cell[1] = 0; cell[1] < WEFT_MERL_THETA_D; cell[1] += STEP)
+            for (cell[2] = 0; cell[2] < WEFT_MERL_PHI_D; cell[2] += STEP) {
                 double light[3], view[3], f[2];
                 for (int k = 0; k < 2; k++) {
                     double rgb[3];
-                    cell_directions(h, d, p, 0, k ? 0.7 : 0, light, view);
+                    directions_in(database_size, cell, 0, k ? 0.7 : 0, light, view);
                     weft_brdf_eval_one(brdf, values, light, view, rgb);
                     f[k] = rgb[1];
                 }
@@ -173,21 +184,12 @@ static weft_err check_isotropic(const weft_brdf *brdf, const double *values, wef
 weft_err weft_merl_write(const char *path, const weft_brdf *brdf, const double values[WEFT_BRDF_MAX_PLANES],
                          weft_error *err)
 {
-    static const int32_t header[3] = {WEFT_MERL_THETA_H, WEFT_MERL_THETA_D, WEFT_MERL_PHI_D};
-    const size_t n = HEADER_BYTES + 3 * sizeof(double) * (size_t)N_CELLS;
+    weft_merl *merl;
     if (brdf->flags & WEFT_BRDF_ANISOTROPIC)
         WEFT_TRY(check_isotropic(brdf, values, err));
-    char *const bytes = weft_alloc(n, 1, err);
-    double *const cells = weft_alloc(3 * (size_t)N_CELLS, sizeof(double), err);
-    weft_err status = bytes && cells ? WEFT_OK : WEFT_ERR_NOMEM;
-    if (status == WEFT_OK) {
-        weft_parallel_rows(WEFT_MERL_THETA_H * WEFT_MERL_THETA_D, fill_rows,
-                           &(fill_job){brdf, values, cells});
-        memcpy(bytes, header, HEADER_BYTES);
-        memcpy(bytes + HEADER_BYTES, cells, n - HEADER_BYTES);
-        status = weft_file_write(path, bytes, n, err);
-    }
-    weft_free(cells);
-    weft_free(bytes);
+    WEFT_TRY(weft_merl_create(database_size, brdf->name, &merl, err));
+    weft_parallel_rows(merl->size[0] * merl->size[1], fill_rows, &(fill_job){brdf, values, merl});
+    const weft_err status = weft_merl_save(path, merl, err);
+    weft_merl_destroy(merl);
     return status;
 }

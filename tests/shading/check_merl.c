@@ -91,6 +91,16 @@ static double *read_file(const char *path)
     return cells;
 }
 
+/* The numbers of the angles' table; free() them.  Written once: 35 MB that go to the disk. */
+static double *write_angles(void)
+{
+    const char *const path = weft_test_path("angles.binary");
+    const double nothing[WEFT_BRDF_MAX_PLANES] = {0};
+    if (!weft_file_exists(path))
+        assert_ok(weft_merl_write(path, &angles_model, nothing, err));
+    return read_file(path);
+}
+
 static void random_pair(uint64_t *random, double light[3], double view[3])
 {
     weft_brdf_direction(weft_test_random(random), 7 * weft_test_random(random), light);
@@ -107,11 +117,8 @@ static void test_every_number_is_where_readers_look(void **state)
 {
     (void)state;
     static const double scale[3] = {1.0 / 1500, 1.15 / 1500, 1.66 / 1500};
-    const char *const path = weft_test_path("angles.binary");
-    const double nothing[WEFT_BRDF_MAX_PLANES] = {0};
     uint64_t random = 7;
-    assert_ok(weft_merl_write(path, &angles_model, nothing, err));
-    double *const stored = read_file(path);
+    double *const stored = write_angles();
     int whole = 0;
     for (int i = 0; i < 200000; i++) {
         double light[3], view[3], angle[3], got[3];
@@ -141,10 +148,7 @@ static void test_every_number_is_where_readers_look(void **state)
 static void test_cells_below_the_horizon_are_marked(void **state)
 {
     (void)state;
-    const char *const path = weft_test_path("angles.binary");
-    const double nothing[WEFT_BRDF_MAX_PLANES] = {0};
-    assert_ok(weft_merl_write(path, &angles_model, nothing, err));
-    double *const stored = read_file(path);
+    double *const stored = write_angles();
     int marked = 0;
     for (int i = 0; i < CELLS; i++) {
         const bool below = stored[i] < 0;
