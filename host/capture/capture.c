@@ -4,8 +4,8 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/sha256.h"
-#include "host/capture/auto_exposure.h"
 #include "host/capture/average.h"
+#include "host/capture/exposures.h"
 #include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
@@ -50,12 +50,17 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     if (o->lights & ~every)
         return weft_fail(err, WEFT_ERR_RANGE, "there is no light %d: the controller has 0 to %d",
                          31 - __builtin_clz(o->lights & ~every), n - 1);
+    for (int i = n; i < WEFT_CAPTURE_MAX_LIGHTS; i++)
+        if (o->exposures_s[i] > 0 || o->brackets[i] > 0)
+            return weft_fail(err, WEFT_ERR_RANGE, "there is no light %d: the controller has 0 to %d", i,
+                             n - 1);
     if (o->level > info->level_max)
         return weft_fail(err, WEFT_ERR_RANGE, "level %d is not possible, only 1 to %d", o->level,
                          info->level_max);
     o->lights = o->lights ? o->lights : every;
     o->level = o->level ? o->level : info->level_max;
     o->bracket = o->bracket ? o->bracket : 1;
+    weft_exposures_apply(o);
     o->average = o->average ? o->average : 1;
     o->gain = o->gain > 0 ? o->gain : weft_camera_get_state(run->shooter.camera)->gain;
     o->settle_s = o->settle_s > 0 ? o->settle_s : 0.005;
@@ -69,29 +74,24 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     return WEFT_OK;
 }
 
-static weft_err find_exposure(capture_run *run, int n_lights, weft_error *err)
+static weft_err ask_camera(capture_run *run, double exposure_s, double *achieved_s, weft_error *err)
 {
-    uint32_t patterns[WEFT_CAPTURE_MAX_LIGHTS + 1];
-    int n = 0;
-    for (int light = 0; light < n_lights && !run->o.no_lights; light++)
-        if (run->o.lights >> light & 1)
-            patterns[n++] = UINT32_C(1) << light;
-    if (run->o.no_lights) /* all of them would clip a set that is made for single lights */
-        patterns[n++] = n_lights < 32 ? (UINT32_C(1) << n_lights) - 1 : UINT32_MAX;
-    WEFT_TRY(weft_auto_exposure(&run->shooter, patterns, n, run->o.gain, &run->o.exposure_s, err));
-    weft_explain("exposure %g s", run->o.exposure_s);
+    WEFT_TRY(weft_shooter_set_camera(&run->shooter, exposure_s, run->o.gain, err));
+    *achieved_s = weft_camera_get_state(run->shooter.camera)->exposure_s;
     return WEFT_OK;
 }
 
 /* Each exposure of the plan is told to the camera once, so that an impossible bracket fails at once. */
 static weft_err check_exposures(capture_run *run, weft_error *err)
 {
-    weft_shooter *const s = &run->shooter;
-    for (int i = 0; i < run->plan.n; i++)
-        WEFT_TRY(weft_shooter_set_camera(s, run->plan.frames[i].exposure_s, run->o.gain, err));
-    WEFT_TRY(weft_shooter_set_camera(s, run->o.exposure_s, run->o.gain, err));
-    run->report.exposure_s = weft_camera_get_state(s->camera)->exposure_s;
-    run->report.gain = weft_camera_get_state(s->camera)->gain;
+    double achieved_s;
+    for (int i = 0; i < run->plan.n; i++) {
+        WEFT_TRY(ask_camera(run, run->plan.frames[i].exposure_s, &achieved_s, err));
+        run->report.n_exposures += run->plan.frames[i].role == WEFT_ROLE_LIGHT;
+    }
+    WEFT_TRY(ask_camera(run, weft_exposures_shortest(&run->o), &run->report.shortest_s, err));
+    WEFT_TRY(ask_camera(run, weft_exposures_longest(&run->o), &run->report.exposure_s, err));
+    run->report.gain = weft_camera_get_state(run->shooter.camera)->gain;
     return WEFT_OK;
 }
 
@@ -256,8 +256,10 @@ static void remember_dark_mean(capture_run *run, const weft_shot *shot)
 /* What the lights are compared with when the set has or gets no ambient frame now. */
 static weft_err look_at_the_dark(capture_run *run, weft_error *err)
 {
-    const weft_planned_frame frame = {
-        .role = WEFT_ROLE_AMBIENT, .light = -1, .exposure_s = run->o.exposure_s, .middle = true};
+    const weft_planned_frame frame = {.role = WEFT_ROLE_AMBIENT,
+                                      .light = -1,
+                                      .exposure_s = weft_exposures_longest(&run->o),
+                                      .middle = true};
     weft_shot shot;
     json_t *const reasons = json_array();
     const weft_err status = shoot_until_good(run, &frame, &shot, reasons, err);
@@ -475,8 +477,8 @@ static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
         WEFT_TRY(describe_set(run, err));
     WEFT_TRY(
         make_plan(run, info, camera, err)); /* once without exposures: a wish that cannot be fails at once */
-    if (run->o.exposure_s <= 0) {
-        WEFT_TRY(find_exposure(run, info->n_lights, err));
+    if (weft_exposures_are_open(&run->o)) {
+        WEFT_TRY(weft_exposures_find(&run->shooter, &run->o, info->n_lights, err));
         WEFT_TRY(make_plan(run, info, camera, err));
     }
     WEFT_TRY(check_exposures(run, err));

@@ -20,18 +20,21 @@
 
 #define WEFT_CAPTURE_MAX_LIGHTS  32
 #define WEFT_CAPTURE_MAX_BRACKET 9
-/** Exposures of a bracket differ by this factor. */
-#define WEFT_CAPTURE_BRACKET_FACTOR 4.0
+/** The bracket that each light needs, found out by looking. */
+#define WEFT_CAPTURE_BRACKET_AUTO (-1)
 
 /** What is to be captured.  {.folder = ...} alone is a sensible set: every light and the ambient frame. */
 typedef struct weft_capture_options {
-    const char *folder;    /* "twill.set" */
-    const char *name;      /* NULL: the folder's name without ".set" */
-    uint32_t lights;       /* bit i: light i is photographed alone; 0: all lights of the controller */
-    bool no_lights;        /* no frame with a single light (a board needs only the frame with all) */
-    double exposure_s;     /* 0: found out so that the brightest thousandth lies at 70 % of the range */
-    double gain;           /* 0: the camera's base gain */
-    int bracket;           /* exposures per light, 1..WEFT_CAPTURE_MAX_BRACKET; 0: 1 */
+    const char *folder; /* "twill.set" */
+    const char *name;   /* NULL: the folder's name without ".set" */
+    uint32_t lights;    /* bit i: light i is photographed alone; 0: all lights of the controller */
+    bool no_lights;     /* no frame with a single light (a board needs only the frame with all) */
+    double exposure_s;  /* 0: found out so that the brightest thousandth lies at 70 % of the range */
+    bool each;          /* what is found out is so for each light by itself, not for the brightest of all */
+    double exposures_s[WEFT_CAPTURE_MAX_LIGHTS]; /* of a light; 0: as exposure_s says */
+    double gain;                                 /* 0: the camera's base gain */
+    int bracket; /* exposures per light, 1..WEFT_CAPTURE_MAX_BRACKET or WEFT_CAPTURE_BRACKET_AUTO; 0: 1 */
+    int brackets[WEFT_CAPTURE_MAX_LIGHTS]; /* of a light; 0: as bracket says */
     int average;           /* frames of which each file is the mean, 1..WEFT_AVERAGE_MAX; 0: 1 */
     int level;             /* brightness of the lights, 1..level_max; 0: full */
     bool no_ambient;       /* no frame with all lights off */
@@ -57,7 +60,9 @@ typedef struct weft_capture_report {
     int n_taken, n_kept;     /* now; from before */
     int n_retries;           /* frames that were taken again */
     int n_warnings;          /* clipped frames, bright room */
-    double exposure_s, gain; /* as the camera set them; of the middle of a bracket */
+    double exposure_s, gain; /* as the camera set them; of the middle of a bracket, of the longest light */
+    double shortest_s;       /* likewise, of the shortest light */
+    int n_exposures;         /* of lights: more than there are lights when some have brackets */
     double seconds;
 } weft_capture_report;
 

@@ -31,11 +31,21 @@ static double black_of(const weft_mosaic *m, int colour)
     return n ? sum / n : 0;
 }
 
+/* The level at or below which so many of the photosites lie. */
+static int quantile(const uint32_t *counts, double wanted)
+{
+    double below = 0;
+    for (int dn = 0; dn < N_LEVELS; dn++)
+        if ((below += counts[dn]) >= wanted && counts[dn])
+            return dn;
+    return 0;
+}
+
 static void summarise(const uint32_t *counts, double black, double white, weft_colour_stats *stats,
                       double *total, double *n_total)
 {
-    double n = 0, sum = 0, clipped = 0, below = 0;
-    int max = 0, high = -1;
+    double n = 0, sum = 0, clipped = 0;
+    int max = 0;
     for (int dn = 0; dn < N_LEVELS; dn++) {
         if (!counts[dn])
             continue;
@@ -44,14 +54,11 @@ static void summarise(const uint32_t *counts, double black, double white, weft_c
         clipped += dn >= white ? counts[dn] : 0;
         max = dn;
     }
-    for (int dn = 0; dn < N_LEVELS && high < 0 && n > 0; dn++) {
-        below += counts[dn];
-        if (below >= 0.999 * n)
-            high = dn;
-    }
     const double scale = 1 / fmax(white - black, 1);
     *stats = n > 0 ? (weft_colour_stats){.mean = (sum / n - black) * scale,
-                                         .high = (high - black) * scale,
+                                         .middle = (quantile(counts, 0.5 * n) - black) * scale,
+                                         .high = (quantile(counts, 0.999 * n) - black) * scale,
+                                         .top = (quantile(counts, 0.9999 * n) - black) * scale,
                                          .max = (max - black) * scale,
                                          .clipped = clipped / n}
                    : (weft_colour_stats){0};
@@ -93,9 +100,9 @@ double weft_frame_stats_clipped(const weft_frame_stats *stats, const char **colo
 json_t *weft_frame_stats_to_json(const weft_frame_stats *stats)
 {
     const weft_colour_stats *const c = stats->colours;
-    return json_pack("{s:o, s:o, s:o, s:o}", "mean",
-                     weft_json_numbers((const double[]){c[0].mean, c[1].mean, c[2].mean}, 3), "high",
-                     weft_json_numbers((const double[]){c[0].high, c[1].high, c[2].high}, 3), "max",
-                     weft_json_numbers((const double[]){c[0].max, c[1].max, c[2].max}, 3), "clipped",
-                     weft_json_numbers((const double[]){c[0].clipped, c[1].clipped, c[2].clipped}, 3));
+#define OF_EACH(what) weft_json_numbers((const double[]){c[0].what, c[1].what, c[2].what}, 3)
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "mean", OF_EACH(mean), "middle", OF_EACH(middle),
+                     "high", OF_EACH(high), "top", OF_EACH(top), "max", OF_EACH(max), "clipped",
+                     OF_EACH(clipped));
+#undef OF_EACH
 }

@@ -9,7 +9,9 @@
 /** Of one colour of the filter array.  Shares of the range: (DN - black) / (white - black). */
 typedef struct weft_colour_stats {
     double mean;
-    double high;    /* 99.9 % of the photosites lie at or below */
+    double middle;  /* half of the photosites lie at or below */
+    double high;    /* 99.9 % lie at or below */
+    double top;     /* 99.99 % lie at or below */
     double max;     /* the brightest photosite */
     double clipped; /* share of the photosites at or above white, 0..1 */
 } weft_colour_stats;
@@ -26,7 +28,8 @@ weft_err weft_frame_stats_make(const weft_mosaic *mosaic, weft_frame_stats *stat
 double weft_frame_stats_high(const weft_frame_stats *stats);
 double weft_frame_stats_clipped(const weft_frame_stats *stats, const char **colour);
 
-/** {"mean":[r,g,b],"high":[...],"max":[...],"clipped":[...]}; NULL without memory. */
+/** {"mean":[r,g,b],"middle":[...],"high":[...],"top":[...],"max":[...],"clipped":[...]}; NULL without
+ *  memory. */
 json_t *weft_frame_stats_to_json(const weft_frame_stats *stats);
 
 #endif

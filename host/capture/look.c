@@ -25,37 +25,42 @@ static weft_err look_at(weft_shooter *s, int light, weft_capture_look *look, wef
     if (shot.reason[0] || light < 0)
         return WEFT_OK;
     const char *colour;
-    double high = weft_frame_stats_high(&shot.stats), measured_s = look->exposure_s;
+    double measured_s = look->exposure_s;
     if (weft_frame_stats_clipped(&shot.stats, &colour) > CLIPPED_SHARE)
         look->n_clipped++;
-    for (int i = 0; i < TRIES && high >= TOO_BRIGHT && !shot.reason[0]; i++) { /* what clips is no measure */
-        measured_s /= 4;
+    weft_light_level level = weft_light_level_of(&shot.stats, measured_s);
+    for (int i = 0; i < TRIES && level.top * measured_s >= TOO_BRIGHT && !shot.reason[0]; i++) {
+        measured_s /= 4; /* what clips is no measure */
         WEFT_TRY(weft_shoot(s, UINT32_C(1) << light, measured_s, look->gain, &shot, err));
-        high = weft_frame_stats_high(&shot.stats);
+        const weft_light_level darker = weft_light_level_of(&shot.stats, measured_s);
+        level.top = darker.top;
+        level.high = level.high * 4 * measured_s >= TOO_BRIGHT ? darker.high : level.high;
     }
-    if (high > TOO_DARK && high < TOO_BRIGHT && !shot.reason[0])
-        l->suggested_s = measured_s * WEFT_AUTO_EXPOSURE_TARGET / high;
+    if (level.high * measured_s > TOO_DARK && level.high * measured_s < TOO_BRIGHT && !shot.reason[0]) {
+        l->level = level;
+        l->suggested_s = WEFT_AUTO_EXPOSURE_TARGET / level.high;
+        l->bracket = weft_light_level_bracket(&level, l->suggested_s);
+    }
     return WEFT_OK;
 }
 
-/* The shortest exposure serves all; the longest tells how wide a bracket would have to be. */
+/* The shortest exposure serves all; a light that would be too dark at it gets a bracket, or its own. */
 static void suggest(weft_capture_look *look)
 {
-    double longest_s = 0;
-    look->suggested_s = 0;
+    look->suggested_s = look->longest_s = 0;
+    look->bracket = 1;
     for (int i = 0; i < look->n; i++) {
         const double s = look->lights[i].suggested_s;
         if (s <= 0)
             continue;
         look->suggested_s = look->suggested_s > 0 ? fmin(look->suggested_s, s) : s;
-        longest_s = fmax(longest_s, s);
+        look->longest_s = fmax(look->longest_s, s);
     }
-    look->bracket = 1;
-    if (look->suggested_s <= 0)
-        return;
-    while (look->bracket < WEFT_CAPTURE_MAX_BRACKET &&
-           look->suggested_s * pow(WEFT_CAPTURE_BRACKET_FACTOR, (look->bracket - 1) / 2.0 + 0.5) < longest_s)
-        look->bracket += 2;
+    for (int i = 0; i < look->n; i++)
+        if (look->lights[i].suggested_s > 0) {
+            const int n = weft_light_level_bracket(&look->lights[i].level, look->suggested_s);
+            look->bracket = n > look->bracket ? n : look->bracket;
+        }
 }
 
 static weft_err look_at_all(weft_shooter *s, const weft_capture_options *o, uint32_t lights, int n_lights,

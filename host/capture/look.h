@@ -2,6 +2,7 @@
 #ifndef WEFT_HOST_CAPTURE_LOOK_H
 #define WEFT_HOST_CAPTURE_LOOK_H
 
+#include "host/capture/auto_exposure.h"
 #include "host/capture/capture.h"
 #include "host/capture/frame_stats.h"
 
@@ -9,15 +10,17 @@ typedef struct weft_light_look {
     int light;              /* -1: all lights off */
     char reason[200];       /* why there is no good frame; else empty */
     weft_frame_stats stats; /* at the exposure of the look */
+    weft_light_level level; /* zeroed when suggested_s is not to be told */
     double suggested_s; /* puts the brightest thousandth at WEFT_AUTO_EXPOSURE_TARGET; 0: not to be told */
+    int bracket;        /* exposures around suggested_s that hold both ends; 0: not to be told */
 } weft_light_look;
 
 typedef struct weft_capture_look {
     double exposure_s, gain; /* of the frames that were looked at */
     double suggested_s;      /* the one exposure that suits all lights: the shortest of theirs */
-    int bracket;   /* exposures, a factor of WEFT_CAPTURE_BRACKET_FACTOR apart, that serve the weakest
-                      light as well as the strongest: 1, 3, ... */
-    int n_clipped; /* lights with more than 0.1 % of a colour clipped */
+    double longest_s;        /* the longest of theirs */
+    int bracket;             /* the widest that a light needs around suggested_s */
+    int n_clipped;           /* lights with more than 0.1 % of a colour clipped */
     int n;
     weft_light_look lights[1 + WEFT_CAPTURE_MAX_LIGHTS]; /* the first is "all off" */
 } weft_capture_look;

@@ -1,5 +1,8 @@
 #include "host/capture/plan.h"
 
+#include "host/capture/auto_exposure.h"
+#include "host/capture/exposures.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,18 +24,27 @@ static void add_single(weft_capture_plan *plan, weft_frame_role role, uint32_t l
                                    .shortest = true});
 }
 
+static void add_exposure(weft_capture_plan *plan, int light, double exposure_s, int i, int n_exposures)
+{
+    const int middle = (n_exposures - 1) / 2;
+    add(plan, (weft_planned_frame){.role = WEFT_ROLE_LIGHT,
+                                   .light = light,
+                                   .lights = UINT32_C(1) << light,
+                                   .exposure_s = exposure_s * pow(WEFT_CAPTURE_BRACKET_FACTOR, i - middle),
+                                   .bracket = n_exposures > 1 ? i : -1,
+                                   .middle = i == middle,
+                                   .shortest = i == 0});
+}
+
+/* The middle of a bracket comes first: it shows whether the light is on, and the others are compared with it.
+ */
 static void add_light(weft_capture_plan *plan, int light, double exposure_s, int n_exposures)
 {
     const int middle = (n_exposures - 1) / 2;
+    add_exposure(plan, light, exposure_s, middle, n_exposures);
     for (int i = 0; i < n_exposures; i++)
-        add(plan,
-            (weft_planned_frame){.role = WEFT_ROLE_LIGHT,
-                                 .light = light,
-                                 .lights = UINT32_C(1) << light,
-                                 .exposure_s = exposure_s * pow(WEFT_CAPTURE_BRACKET_FACTOR, i - middle),
-                                 .bracket = n_exposures > 1 ? i : -1,
-                                 .middle = i == middle,
-                                 .shortest = i == 0});
+        if (i != middle)
+            add_exposure(plan, light, exposure_s, i, n_exposures);
 }
 
 void weft_planned_frame_words(const weft_planned_frame *frame, char text[32])
@@ -87,16 +99,18 @@ weft_err weft_capture_plan_make(const weft_capture_options *o, int n_lights, con
 {
     const uint32_t every = n_lights < 32 ? (UINT32_C(1) << n_lights) - 1 : UINT32_MAX;
     const char *const template = o->file_name ? o->file_name : WEFT_FRAME_NAME_DEFAULT;
+    const double longest_s = weft_exposures_longest(o); /* the least noise where there is least light */
     *plan = (weft_capture_plan){0};
     if (!o->no_ambient) /* first: what the lights are compared with */
-        add_single(plan, WEFT_ROLE_AMBIENT, 0, o->exposure_s);
+        add_single(plan, WEFT_ROLE_AMBIENT, 0, longest_s);
     for (int light = 0; light < n_lights && !o->no_lights; light++)
         if (o->lights >> light & 1)
-            add_light(plan, light, o->exposure_s, o->bracket);
+            add_light(plan, light, o->exposures_s[light] > 0 ? o->exposures_s[light] : 1,
+                      o->brackets[light] > 0 ? o->brackets[light] : WEFT_LIGHT_LEVEL_MAX_BRACKET);
     if (o->all)
-        add_single(plan, WEFT_ROLE_ALL, every, o->exposure_s);
+        add_single(plan, WEFT_ROLE_ALL, every, weft_exposures_shortest(o));
     if (o->dark) /* last: somebody has to come and cap the lens */
-        add_single(plan, WEFT_ROLE_DARK, 0, o->exposure_s);
+        add_single(plan, WEFT_ROLE_DARK, 0, longest_s);
     WEFT_TRY(weft_frame_name_check(template, err));
     return name_frames(template, set, suffix, plan, err);
 }

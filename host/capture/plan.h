@@ -27,7 +27,9 @@ typedef struct weft_capture_plan {
 } weft_capture_plan;
 
 /**
- * Makes the plan.  `options` must be complete: lights, exposure, bracket set.
+ * Makes the plan.  The lights of `options` must be set; exposures that are still open count as 1 s and open
+ * brackets as the widest, so that a plan can be checked before anything is looked for.  Ambient and dark
+ * frame have the longest of the lights' exposures, the frame with all lights the shortest.
  *
  * @param set     its name and date are what the names of the files may say
  * @param suffix  ends the names of the files: ".dng", ".nef"

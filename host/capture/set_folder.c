@@ -185,6 +185,50 @@ static weft_err adopt_more(const json_t *stored, const char *key, bool *value, c
     return WEFT_OK;
 }
 
+/* What the set has for a light; sets of before had one for all. */
+static weft_err stored_of_light(const weft_set *set, const json_t *stored, const char *list,
+                                const char *common, int light, double *begun, weft_error *err)
+{
+    const json_t *const array = json_object_get(stored, list), *const item =
+                                                                   json_array_get(array, (size_t)light);
+    if (!array)
+        return weft_json_get_number(stored, common, WEFT_JSON_REQUIRED, 0, 4294967295.0, begun, set->folder,
+                                    err);
+    if (!json_is_number(item))
+        return weft_fail(err, WEFT_ERR_FORMAT,
+                         "%s: set.json has no \"%s\" of light %d; begin anew with --force", set->folder, list,
+                         light);
+    *begun = json_number_value(item);
+    return WEFT_OK;
+}
+
+/* After the lights are known. */
+static weft_err adopt_of_lights(const weft_set *set, const json_t *stored, weft_capture_options *o,
+                                weft_error *err)
+{
+    for (int light = 0; light < WEFT_CAPTURE_MAX_LIGHTS; light++) {
+        double exposure_s = 0, bracket = 0;
+        char option[48];
+        if (o->no_lights || !(o->lights >> light & 1))
+            continue;
+        WEFT_TRY(stored_of_light(set, stored, "exposures_s", "exposure_s", light, &exposure_s, err));
+        WEFT_TRY(stored_of_light(set, stored, "brackets", "bracket", light, &bracket, err));
+        if (!(exposure_s > 0) || !(bracket >= 1 && bracket <= WEFT_CAPTURE_MAX_BRACKET))
+            return weft_fail(err, WEFT_ERR_RANGE,
+                             "%s: set.json has %g exposures of %g s for light %d; begin anew with --force",
+                             set->folder, bracket, exposure_s, light);
+        snprintf(option, sizeof option, "exposure of light %d", light);
+        if (o->exposures_s[light] > 0 && fabs(o->exposures_s[light] - exposure_s) > 1e-6 * exposure_s)
+            return differs(set, option, exposure_s, o->exposures_s[light], err);
+        snprintf(option, sizeof option, "bracket of light %d", light);
+        if (o->brackets[light] > 0 && o->brackets[light] != (int)bracket)
+            return differs(set, option, bracket, o->brackets[light], err);
+        o->exposures_s[light] = exposure_s;
+        o->brackets[light] = (int)bracket;
+    }
+    return WEFT_OK;
+}
+
 /* The text lives as long as the set. */
 static weft_err adopt_file_name(const weft_set *set, const json_t *stored, const char **value,
                                 weft_error *err)
@@ -214,15 +258,29 @@ weft_err weft_set_folder_adopt(const weft_set *set, weft_capture_options *o, wef
     WEFT_TRY(adopt_number(set, stored, "gain", &o->gain, err));
     WEFT_TRY(adopt_number(set, stored, "settle_s", &o->settle_s, err));
     WEFT_TRY(adopt_int(set, stored, "bracket", &o->bracket, err));
+    if (o->bracket == 0)
+        o->bracket = WEFT_CAPTURE_BRACKET_AUTO; /* resolved: each light has its own below */
     WEFT_TRY(adopt_int(set, stored, "level", &o->level, err));
     if (json_object_get(stored, "average")) /* sets of before had none */
         WEFT_TRY(adopt_int(set, stored, "average", &o->average, err));
     WEFT_TRY(adopt_file_name(set, stored, &o->file_name, err));
     WEFT_TRY(adopt_more(stored, "sidecar", &o->sidecar, set->folder, err));
     WEFT_TRY(adopt_more(stored, "no_lights", &o->no_lights, set->folder, err));
+    WEFT_TRY(adopt_of_lights(set, stored, o, err));
     WEFT_TRY(adopt_more(stored, "no_ambient", &o->no_ambient, set->folder, err));
     WEFT_TRY(adopt_more(stored, "all", &o->all, set->folder, err));
     return adopt_more(stored, "dark", &o->dark, set->folder, err);
+}
+
+/* One number for each light up to the last, null for those that have no frame. */
+static json_t *numbers_of_lights(const weft_capture_options *o, const double *reals, const int *integers)
+{
+    json_t *const list = json_array();
+    for (int i = 0; i < WEFT_CAPTURE_MAX_LIGHTS && o->lights >> i; i++)
+        json_array_append_new(list, !(o->lights >> i & 1) ? json_null()
+                                    : reals               ? json_real(reals[i])
+                                                          : json_integer(integers[i]));
+    return list;
 }
 
 weft_err weft_set_folder_remember(weft_set *set, const weft_capture_options *o,
@@ -231,12 +289,16 @@ weft_err weft_set_folder_remember(weft_set *set, const weft_capture_options *o,
     json_t *const capture = json_pack(
         "{s:I, s:f, s:f, s:f, s:i, s:i, s:i, s:s, s:b, s:b, s:b, s:b, s:b, s:{s:s, s:s, s:s}}", "lights",
         (json_int_t)o->lights, "exposure_s", o->exposure_s, "gain", o->gain, "settle_s", o->settle_s,
-        "bracket", o->bracket, "level", o->level, "average", o->average, "file_name",
+        "bracket", o->bracket > 0 ? o->bracket : 0, "level", o->level, "average", o->average, "file_name",
         o->file_name ? o->file_name : WEFT_FRAME_NAME_DEFAULT, "sidecar", o->sidecar, "no_lights",
         o->no_lights, "no_ambient", o->no_ambient, "all", o->all, "dark", o->dark, "controller", "firmware",
         controller->firmware, "git_id", controller->git_id, "serial", controller->serial_number);
     if (!set->other)
         set->other = json_object();
+    if (capture && !o->no_lights) {
+        json_object_set_new(capture, "exposures_s", numbers_of_lights(o, o->exposures_s, NULL));
+        json_object_set_new(capture, "brackets", numbers_of_lights(o, NULL, o->brackets));
+    }
     if (!capture || json_object_set_new(set->other, "capture", capture) != 0)
         return weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the settings of the set");
     return WEFT_OK;

@@ -9,15 +9,16 @@
 #include "host/cli/command.h"
 #include "host/cli/device_open.h"
 
+#include <math.h>
 #include <poll.h>
 #include <string.h>
 #include <unistd.h>
 
 typedef struct capture_args {
     weft_device_options devices;
-    const char *lights, *exposure, *name, *trigger, *file_name;
+    const char *lights, *exposure, *name, *trigger, *file_name, *bracket;
     double gain, settle_s;
-    int bracket, average, level;
+    int average, level;
     bool ambient, no_ambient, dark, all_frame, only_all, resume, dry_run, sidecar;
 } capture_args;
 
@@ -32,8 +33,9 @@ static const weft_field capture_fields[] = {
      .short_opt = 'e',
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(capture_args, exposure),
-     .unit = "S",
-     .help = "seconds, or auto: the brightest thousandth at 70 % of the range (default auto)"},
+     .unit = "S|LIST",
+     .help = "seconds; auto: the brightest thousandth of the brightest light at 70 % of the range; each: of "
+             "each light; LIGHT:S: that light, as each,3:0.01 (default auto)"},
     {.key = "gain",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(capture_args, gain),
@@ -42,12 +44,11 @@ static const weft_field capture_fields[] = {
      .max = 1000,
      .help = "analogue gain, 1 = base (default: the camera's least)"},
     {.key = "bracket",
-     .type = WEFT_FIELD_INT,
+     .type = WEFT_FIELD_TEXT,
      .offset = offsetof(capture_args, bracket),
-     .unit = "N",
-     .min = 1,
-     .max = WEFT_CAPTURE_MAX_BRACKET,
-     .help = "exposures of each light, a factor of 4 apart, around --exposure (default 1)"},
+     .unit = "N|LIST",
+     .help = "exposures of each light, a factor of 4 apart, around --exposure; auto: as many as it needs; "
+             "LIGHT:N: of that light, as 1,3:5 (default 1)"},
     {.key = "average",
      .type = WEFT_FIELD_INT,
      .offset = offsetof(capture_args, average),
@@ -142,13 +143,87 @@ static weft_err parse_lights(const char *text, uint32_t *mask, weft_error *err)
     }
 }
 
-static weft_err parse_exposure(const char *text, double *exposure_s, weft_error *err)
+/* One item of a list as "each,3:0.01,7:0.1": a word or number for all lights, or LIGHT:NUMBER. */
+typedef struct list_item {
+    int light;        /* -1: for all */
+    const char *text; /* the word or number */
+    size_t n;
+    double number; /* NAN: it is a word */
+} list_item;
+
+/* @return what follows the item, or NULL when it is none */
+static const char *next_item(const char *text, list_item *item)
 {
-    *exposure_s = 0;
-    if (!text || strcmp(text, "auto") == 0)
-        return WEFT_OK;
-    if (!weft_text_to_double(text, exposure_s) || *exposure_s < 1e-6 || *exposure_s > 600)
-        return weft_fail(err, WEFT_ERR_USAGE, "--exposure %s: wanted auto, or 0.000001 to 600 s", text);
+    double light;
+    const char *p = weft_text_scan_double(text, &light);
+    *item = (list_item){.light = -1, .text = text, .number = NAN};
+    if (p && *p == ':') {
+        if (light < 0 || light >= WEFT_CAPTURE_MAX_LIGHTS || light != (int)light)
+            return NULL;
+        item->light = (int)light;
+        item->text = p + 1;
+    }
+    item->n = strcspn(item->text, ",");
+    p = weft_text_scan_double(item->text, &item->number);
+    if (!p || p != item->text + item->n)
+        item->number = NAN;
+    return item->n > 0 && (item->text[item->n] == '\0' || item->text[item->n + 1])
+               ? item->text + item->n + (item->text[item->n] == ',')
+               : NULL;
+}
+
+static bool is_word(const list_item *item, const char *word)
+{
+    return item->light < 0 && item->n == strlen(word) && memcmp(item->text, word, item->n) == 0;
+}
+
+static weft_err parse_exposures(const char *text, weft_capture_options *o, weft_error *err)
+{
+    bool has_common = false;
+    list_item item;
+    for (const char *p = text; p && *p;) {
+        p = next_item(p, &item);
+        const bool in_range = item.number >= 1e-6 && item.number <= 600;
+        double *const exposure_s = item.light >= 0 ? &o->exposures_s[item.light] : &o->exposure_s;
+        if (!p || (item.light < 0 ? has_common : *exposure_s > 0) ||
+            !(in_range || is_word(&item, "auto") || is_word(&item, "each")))
+            return weft_fail(err, WEFT_ERR_USAGE,
+                             "--exposure %s: wanted auto, each or 0.000001 to 600 s, and LIGHT:S for lights "
+                             "that differ, each once, as 0.04,3:0.01",
+                             text);
+        has_common |= item.light < 0;
+        o->each |= is_word(&item, "each");
+        if (in_range)
+            *exposure_s = item.number;
+    }
+    return WEFT_OK;
+}
+
+static weft_err parse_brackets(const char *text, weft_capture_options *o, weft_error *err)
+{
+    list_item item;
+    for (const char *p = text; p && *p;) {
+        p = next_item(p, &item);
+        const bool in_range =
+            item.number >= 1 && item.number <= WEFT_CAPTURE_MAX_BRACKET && item.number == (int)item.number;
+        int *const n = item.light >= 0 ? &o->brackets[item.light] : &o->bracket;
+        if (!p || *n || !(in_range || is_word(&item, "auto")))
+            return weft_fail(err, WEFT_ERR_USAGE,
+                             "--bracket %s: wanted auto or 1 to %d, and LIGHT:N for lights that differ, each "
+                             "once, as 1,3:5",
+                             text, WEFT_CAPTURE_MAX_BRACKET);
+        *n = in_range ? (int)item.number : WEFT_CAPTURE_BRACKET_AUTO;
+    }
+    return WEFT_OK;
+}
+
+/* A light that has its own exposure but no frame is a slip. */
+static weft_err check_lights_have_frames(const weft_capture_options *o, weft_error *err)
+{
+    for (int i = 0; i < WEFT_CAPTURE_MAX_LIGHTS && o->lights; i++)
+        if (!(o->lights >> i & 1) && (o->exposures_s[i] > 0 || o->brackets[i] > 0))
+            return weft_fail(err, WEFT_ERR_USAGE, "light %d has its own %s but is not in --lights", i,
+                             o->exposures_s[i] > 0 ? "--exposure" : "--bracket");
     return WEFT_OK;
 }
 
@@ -160,7 +235,6 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
         .name = a->name,
         .no_lights = a->only_all,
         .gain = a->gain,
-        .bracket = a->bracket,
         .average = a->average,
         .level = a->level,
         .no_ambient = a->no_ambient || (a->only_all && !a->ambient),
@@ -180,7 +254,7 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
         return weft_fail(err, WEFT_ERR_USAGE, "SET is missing");
     if (a->ambient && a->no_ambient)
         return weft_fail(err, WEFT_ERR_USAGE, "--ambient and --no-ambient exclude each other");
-    if (a->only_all && (a->lights || a->bracket > 1))
+    if (a->only_all && (a->lights || a->bracket))
         return weft_fail(err, WEFT_ERR_USAGE,
                          "--only-all takes no single lights: leave out --lights and --bracket");
     if (a->resume && inv->force)
@@ -189,7 +263,9 @@ static weft_err make_options(const weft_invocation *inv, const capture_args *a, 
     if (a->file_name)
         WEFT_TRY(weft_frame_name_check(a->file_name, err));
     WEFT_TRY(parse_lights(a->lights, &o->lights, err));
-    return parse_exposure(a->exposure, &o->exposure_s, err);
+    WEFT_TRY(parse_exposures(a->exposure, o, err));
+    WEFT_TRY(parse_brackets(a->bracket, o, err));
+    return check_lights_have_frames(o, err);
 }
 
 /* Asks for the lens cap while the controller's lease is kept alive. */
@@ -216,17 +292,21 @@ static weft_err cap_lens(void *controller, weft_error *err)
 static weft_err print_result(const weft_invocation *inv, const weft_set *set, const weft_capture_report *r,
                              weft_error *err)
 {
+    char exposures[64];
     if (inv->json)
         return weft_print_json(inv,
-                               json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:i, s:f, s:f, s:f}", "set",
+                               json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:i, s:f, s:f, s:f, s:f}", "set",
                                          set->folder, "name", set->name, "frames", r->n_frames, "taken",
                                          r->n_taken, "kept", r->n_kept, "retries", r->n_retries, "warnings",
-                                         r->n_warnings, "exposure_s", r->exposure_s, "gain", r->gain,
-                                         "seconds", r->seconds),
+                                         r->n_warnings, "exposure_s", r->exposure_s, "shortest_s",
+                                         r->shortest_s, "gain", r->gain, "seconds", r->seconds),
                                err);
-    fprintf(
-        inv->out, "%s: %d frames (%d taken, %d kept, %d repeated), exposure %.4g s, gain %.3g, in %.1f s\n",
-        set->folder, r->n_frames, r->n_taken, r->n_kept, r->n_retries, r->exposure_s, r->gain, r->seconds);
+    if (r->shortest_s < r->exposure_s)
+        snprintf(exposures, sizeof exposures, "exposures %.4g to %.4g s", r->shortest_s, r->exposure_s);
+    else
+        snprintf(exposures, sizeof exposures, "exposure %.4g s", r->exposure_s);
+    fprintf(inv->out, "%s: %d frames (%d taken, %d kept, %d repeated), %s, gain %.3g, in %.1f s\n",
+            set->folder, r->n_frames, r->n_taken, r->n_kept, r->n_retries, exposures, r->gain, r->seconds);
     return WEFT_OK;
 }
 
@@ -252,29 +332,33 @@ static json_t *look_to_json(const weft_capture_look *look)
     json_t *const lights = json_array();
     for (int i = 0; i < look->n; i++) {
         const weft_light_look *const l = &look->lights[i];
-        json_array_append_new(lights, json_pack("{s:i, s:o, s:o, s:f, s:f, s:s}", "light", l->light, "high",
-                                                numbers(&l->stats, high_of), "clipped",
-                                                numbers(&l->stats, clipped_of), "mean", l->stats.mean,
-                                                "suggested_s", l->suggested_s, "problem", l->reason));
+        json_array_append_new(lights,
+                              json_pack("{s:i, s:o, s:o, s:f, s:f, s:i, s:s}", "light", l->light, "high",
+                                        numbers(&l->stats, high_of), "clipped",
+                                        numbers(&l->stats, clipped_of), "mean", l->stats.mean, "suggested_s",
+                                        l->suggested_s, "bracket", l->bracket, "problem", l->reason));
     }
-    return json_pack("{s:f, s:f, s:f, s:i, s:i, s:o}", "exposure_s", look->exposure_s, "gain", look->gain,
-                     "suggested_s", look->suggested_s, "bracket", look->bracket, "clipped_lights",
-                     look->n_clipped, "lights", lights);
+    return json_pack("{s:f, s:f, s:f, s:f, s:i, s:i, s:o}", "exposure_s", look->exposure_s, "gain",
+                     look->gain, "suggested_s", look->suggested_s, "longest_s", look->longest_s, "bracket",
+                     look->bracket, "clipped_lights", look->n_clipped, "lights", lights);
 }
+
+/* Longest over shortest exposure of the lights, from which on it is worth to give each its own. */
+#define LIGHTS_DIFFER 1.5
 
 static void print_look(const weft_capture_look *look, FILE *out)
 {
     fprintf(out, "at %.4g s, gain %.3g       brightest thousandth, %%    clipped, %%\n", look->exposure_s,
             look->gain);
-    fprintf(out, "%-10s %8s   %6s %6s %6s    %6s %6s %6s   suits\n", "light", "mean, %", "red", "green",
-            "blue", "red", "green", "blue");
+    fprintf(out, "%-10s %8s   %6s %6s %6s    %6s %6s %6s   suits      bracket\n", "light", "mean, %", "red",
+            "green", "blue", "red", "green", "blue");
     for (int i = 0; i < look->n; i++) {
         const weft_light_look *const l = &look->lights[i];
         const weft_colour_stats *const c = l->stats.colours;
         char name[16], suits[32] = "";
         snprintf(name, sizeof name, "%d", l->light);
         if (l->suggested_s > 0)
-            snprintf(suits, sizeof suits, "%.3g s", l->suggested_s);
+            snprintf(suits, sizeof suits, "%-10.3g %d", l->suggested_s, l->bracket);
         else if (l->light >= 0 && !l->reason[0])
             snprintf(suits, sizeof suits, "%s",
                      weft_frame_stats_high(&l->stats) > 0.5 ? "shorter" : "longer");
@@ -285,11 +369,14 @@ static void print_look(const weft_capture_look *look, FILE *out)
                     l->light < 0 ? "all off" : name, 100 * l->stats.mean, 100 * c[0].high, 100 * c[1].high,
                     100 * c[2].high, 100 * c[0].clipped, 100 * c[1].clipped, 100 * c[2].clipped, suits);
     }
-    if (look->suggested_s > 0)
-        fprintf(out, "suggestion: --exposure %.2g%s\n", look->suggested_s,
-                look->bracket > 1 ? ", and a bracket: the lights differ much" : "");
-    if (look->bracket > 1)
-        fprintf(out, "            --bracket %d\n", look->bracket);
+    if (look->suggested_s <= 0)
+        return;
+    fprintf(out, "suggestion: --exposure %.2g%s%s\n", look->suggested_s,
+            look->bracket > 1 ? " --bracket auto" : "",
+            look->bracket > 1 ? " (highlights or shadows need it)" : "");
+    if (look->longest_s > LIGHTS_DIFFER * look->suggested_s)
+        fprintf(out, "        or: --exposure each%s, from %.2g to %.2g s: the lights differ much\n",
+                look->bracket > 1 ? " --bracket auto" : "", look->suggested_s, look->longest_s);
 }
 
 static weft_err dry_run(const weft_invocation *inv, const weft_capture_options *options,

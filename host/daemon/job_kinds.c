@@ -14,7 +14,7 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "light set", .hardware = true, .by_hand = true},
     {.command = "light status", .hardware = true, .by_hand = true},
     {.command = "live", .hardware = true, .by_hand = true, .writes = "output", .texts = "lights"},
-    {.command = "capture", .hardware = true, .resumes = true, .writes = "*", .texts = "lights|exposure|name|trigger|file-name"},
+    {.command = "capture", .hardware = true, .resumes = true, .writes = "*", .texts = "lights|exposure|name|trigger|file-name|bracket"},
     {.command = "calibrate lens", .reads = "*|board-on-table", .writes = "output", .texts = "model|bent"},
     {.command = "calibrate linearity", CHART},
     {.command = "calibrate white", CHART},

@@ -57,7 +57,7 @@ double light_at(const double on[N_LIGHTS])
     double light = bench.room;
     for (int i = 0; i < N_LIGHTS; i++)
         if (!(bench.broken_lamps >> i & 1))
-            light += bench.power * on[i];
+            light += bench.power * on[i] * (bench.faint_lamps >> i & 1 ? 0.2 : 1);
     return light * bench_set.exposure_s * bench_set.gain;
 }
 

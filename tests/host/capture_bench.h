@@ -22,6 +22,7 @@ typedef struct capture_bench {
     const char *serial;       /* of the camera */
     double room, power;       /* share of the range per second: of the room, of a lamp */
     uint32_t broken_lamps;    /* these stay dark */
+    uint32_t faint_lamps;     /* these have a fifth of the power */
     bool slow;                /* waits as a long exposure does, calling idle */
     int n_exposures, deed_at; /* the deed is done at that exposure (counted from 0) and n_deeds on */
     int n_deeds;

@@ -7,6 +7,7 @@
 #include "core/json.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "host/capture/auto_exposure.h"
 #include "host/capture/average.h"
 #include "host/capture/frame_stats.h"
 #include "host/capture/look.h"
@@ -215,9 +216,14 @@ static void test_a_bracket(void **state)
     weft_set set;
     assert_ok(run(&options, &set, &report, err));
     assert_int_equal(set.n_frames, 8); /* ambient, 2 x 3, all */
-    assert_string_equal(set.frames[1].file, "light-02-b0.dng");
-    for (int i = 0; i < 3; i++)
-        assert_near(set.frames[4 + i].exposure_s, 0.01 * pow(4, i), 1e-9);
+    const int order[3] = {1, 0, 2};    /* the middle first: it shows whether the light is on */
+    for (int i = 0; i < 3; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "light-02-b%d.dng", order[i]);
+        assert_string_equal(set.frames[1 + i].file, name);
+        assert_near(set.frames[4 + i].exposure_s, 0.01 * pow(4, order[i]), 1e-9);
+        assert_int_equal(json_integer_value(json_object_get(set.frames[4 + i].capture, "bracket")), order[i]);
+    }
     assert_int_equal(set.frames[7].role, WEFT_ROLE_ALL);
     assert_int_equal(bench.lit_before_end[7], 0x3ff);
     assert_int_equal(report.n_warnings, 1); /* all on clips; the long end of the bracket may */
@@ -227,6 +233,86 @@ static void test_a_bracket(void **state)
     wide.bracket = 9;
     assert_fails(run(&wide, &set, &report, err), WEFT_ERR_RANGE, "only to 10 s");
     assert_false(weft_file_exists(wide.folder));
+}
+
+/* Lights with their own exposures and brackets; a set that is left in mid bracket goes on with them. */
+static void test_exposures_of_each_light(void **state)
+{
+    (void)state;
+    weft_capture_options options = {.folder = weft_test_path("each.set"),
+                                    .exposure_s = 0.04,
+                                    .exposures_s = {[4] = 0.01},
+                                    .brackets = {[4] = 3, [7] = 2},
+                                    .lights = 1 << 2 | 1 << 4 | 1 << 7,
+                                    .average = 2,
+                                    .all = true};
+    const struct {
+        int light;
+        double exposure_s;
+    } wanted[] = {{-1, 0.04}, {2, 0.04}, {4, 0.01}, {4, 0.0025}, {4, 0.04}, {7, 0.04}, {7, 0.16}, {-1, 0.01}};
+    weft_capture_options asks = options;
+    weft_capture_report report;
+    weft_set set;
+    plan_deed(CANCEL_IT, 2 * 3 + 1, 1); /* the second of the two frames of light 4 at 0.0025 s */
+    assert_fails(run(&options, &set, &report, err), WEFT_ERR_CANCELLED, "3 of 8 frames");
+    weft_cancel_request(false);
+    asks.resume = true;
+    asks.exposures_s[4] = 0.02;
+    assert_fails(run(&asks, &set, &report, err), WEFT_ERR_MISMATCH, "exposure of light 4 0.01, not 0.02");
+    asks.exposures_s[4] = 0;
+    asks.brackets[4] = 5;
+    assert_fails(run(&asks, &set, &report, err), WEFT_ERR_MISMATCH, "bracket of light 4 3, not 5");
+    const weft_capture_options go_on = {.folder = options.folder, .resume = true, .each = true};
+    assert_ok(run(&go_on, &set, &report, err));
+    assert_true(report.n_kept == 3 && report.n_taken == 5);
+    assert_true(report.shortest_s == 0.01 && report.exposure_s == 0.04 && report.n_exposures == 6);
+    assert_int_equal(set.n_frames, 8);
+    for (int i = 0; i < 8; i++) {
+        assert_int_equal(set.frames[i].light, wanted[i].light);
+        assert_near(set.frames[i].exposure_s, wanted[i].exposure_s, 1e-9);
+        assert_int_equal(json_integer_value(json_object_get(set.frames[i].capture, "mean_of")), 2);
+    }
+    weft_set_fini(&set);
+    check_folder(options.folder, 8, true);
+    weft_capture_options none = {.folder = weft_test_path("none.set"), .exposures_s = {[12] = 1}};
+    assert_fails(run(&none, &set, &report, err), WEFT_ERR_RANGE, "there is no light 12");
+}
+
+/* Each light's own exposure, and the bracket that its highlights and shadows need. */
+static void test_brackets_are_found(void **state)
+{
+    (void)state;
+    const weft_light_level rows[] = {
+        {.high = 7, .top = 8, .middle = 3},       /* even: one exposure holds all */
+        {.high = 7, .top = 30, .middle = 3},      /* highlights */
+        {.high = 7, .top = 8, .middle = 0.5},     /* shadows */
+        {.high = 7, .top = 30, .middle = 0.5},    /* both */
+        {.high = 7, .top = 8, .middle = 0.1},     /* deep shadows */
+        {.high = 7, .top = 1000, .middle = 1e-9}, /* no more than two steps to either side */
+        {.high = 7, .top = 8, .middle = 0},       /* nothing there */
+    };
+    const int wanted[] = {1, 3, 2, 3, 4, 5, 1};
+    for (int i = 0; i < 7; i++) {
+        assert_near(weft_light_level_exposure(&rows[i]), 0.1, 1e-9);
+        assert_int_equal(weft_light_level_bracket(&rows[i], 0.1), wanted[i]);
+    }
+    weft_capture_options options = {.folder = weft_test_path("found.set"),
+                                    .lights = 1 << 1 | 1 << 3,
+                                    .each = true,
+                                    .bracket = WEFT_CAPTURE_BRACKET_AUTO};
+    weft_capture_report report;
+    weft_set set;
+    bench.power = 15;
+    bench.faint_lamps = 1 << 3; /* a fifth of it */
+    assert_ok(run(&options, &set, &report, err));
+    assert_int_equal(set.n_frames, 3);
+    assert_near(set.frames[1].exposure_s * (15 + bench.room), 0.70, 0.04);
+    assert_near(set.frames[2].exposure_s * (3 + bench.room), 0.70, 0.04);
+    assert_true(set.frames[0].exposure_s == set.frames[2].exposure_s); /* ambient: the longest */
+    weft_set_fini(&set);
+    options.resume = true;
+    run_well(&options, &report); /* what was found is what it was begun with */
+    assert_int_equal(report.n_kept, 3);
 }
 
 /* Names from a template; set.json says what each file is, so a renamed one is found again. */
@@ -488,6 +574,8 @@ static void test_statistics(void **state)
     assert_near(s.colours[1].mean, 0.5, 1e-12);
     assert_near(s.colours[0].high, 1, 1e-12);
     assert_near(s.colours[2].high, 0.1, 1e-12);
+    assert_near(s.colours[0].top, 1.1, 1e-12);
+    assert_near(s.colours[0].middle, 0.1, 1e-12);
     assert_near(s.colours[0].max, 1.1, 1e-12);
     assert_near(weft_frame_stats_clipped(&s, &colour), 0.002, 1e-12);
     assert_string_equal(colour, "red");
@@ -510,6 +598,8 @@ int main(void)
         ON_BENCH(test_a_board_that_resets_is_noticed),
         ON_BENCH(test_a_folder_of_other_things),
         ON_BENCH(test_a_bracket),
+        ON_BENCH(test_exposures_of_each_light),
+        ON_BENCH(test_brackets_are_found),
         ON_BENCH(test_names_of_files),
         ON_BENCH(test_sidecars),
         ON_BENCH(test_exposure_is_found),

@@ -1,6 +1,7 @@
 /* Names of frames from a template: what each field says, what vanishes, what is refused. */
 #include "tests/support/support.h"
 
+#include "host/capture/exposures.h"
 #include "host/capture/frame_name.h"
 #include "host/capture/plan.h"
 
@@ -88,7 +89,7 @@ static void test_collisions(void **state)
     const struct {
         const char *template, *words;
     } rows[] = {
-        {"{kind}-{bracket}", "light 0 and light 1 would both be light-b0.dng; add {light}"},
+        {"{kind}-{bracket}", "light 0 and light 1 would both be light-b1.dng; add {light}"},
         {"{set}-{light}-{bracket}",
          "the ambient frame and the dark frame would both be twill.dng; add {kind}"},
         {"{kind}-{light}",
@@ -96,6 +97,7 @@ static void test_collisions(void **state)
         {"Light-{light}-{bracket}-{set}", "would both be Light-twill.dng; add {kind}"},
     };
     weft_capture_options o = {.lights = 3, .exposure_s = 0.04, .bracket = 3, .dark = true};
+    weft_exposures_apply(&o);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         o.file_name = rows[i].template;
         assert_fails(weft_capture_plan_make(&o, 2, &set, ".dng", &plan, err), WEFT_ERR_USAGE, rows[i].words);
@@ -104,7 +106,8 @@ static void test_collisions(void **state)
     assert_ok(weft_capture_plan_make(&o, 2, &set, ".nef", &plan, err));
     assert_int_equal(plan.n, 8);
     assert_string_equal(plan.frames[0].file, "ambient-0.04s.nef");
-    assert_string_equal(plan.frames[1].file, "light-00-0.01s.nef");
+    assert_string_equal(plan.frames[1].file, "light-00-0.04s.nef"); /* the middle first */
+    assert_string_equal(plan.frames[2].file, "light-00-0.01s.nef");
     assert_string_equal(plan.frames[6].file, "light-01-0.16s.nef");
     assert_true(weft_frame_name_equal("Light-00.DNG", "light-00.dng"));
 }

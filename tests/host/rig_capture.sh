@@ -19,6 +19,25 @@ fail() {
 }
 cd "$work" || exit 1
 
+# What cannot be meant is refused before any device is looked for.
+refused() { # WORDS OPTIONS...
+    local words=$1
+    shift
+    "$weft" capture x.set --rig r "$@" >capture.out 2>capture.err
+    [ $? = 2 ] || fail "capture $*: the exit status is not 2"
+    grep -qF -- "$words" capture.err || fail "capture $*: says $(cat capture.err)"
+}
+for wrong in 0.04,0.05 each,auto 3:0.01,3:0.02 99:1 0.5:1 0.04, , soon 0 -1 nan 3:each 3: :1 0.04,3:0.01s; do
+    refused "--exposure $wrong: wanted auto, each or" --exposure "$wrong"
+done
+for wrong in 0 10 1.5 3,1 3:0 3:auto 40:3 3: some; do
+    refused "--bracket $wrong: wanted auto or 1 to 9" --bracket "$wrong"
+done
+refused "light 3 has its own --exposure but is not in --lights" --lights 0,1 --exposure 0.04,3:0.01
+refused "light 3 has its own --bracket but is not in --lights" --lights 0,1 --bracket 3:3
+refused "there is no field {lamp}" --file-name "{kind}-{lamp}"
+refused "leave out the '/'" --file-name "{kind}/{light}"
+
 "$weft" rig --dir r --sample white --size 308x204 --seed 5 >rig.out 2>rig.err &
 rig=$!
 for _ in $(seq 300); do
@@ -35,6 +54,26 @@ cmp -s <(jq -S . rig.out) <(jq -S . r/rig.json) || fail "rig.json is not what wa
 "$weft" capture twill.set --rig r --exposure 0.03 -q || fail "capture of the twill"
 [ "$(jq '[.frames[] | select(.role == "light")] | length' twill.set/set.json)" = 10 ] || fail "not ten lights"
 cmp -s white.set/light-00.dng twill.set/light-00.dng && fail "both samples look the same"
+
+# Exposures and brackets of single lights, names from a template, sidecars; the set solves whatever its files are called.
+"$weft" capture --dry-run --rig r --json -q >look.json || fail "dry run"
+jq -e '(.lights | length) == 11 and (.lights[1:] | all(.suggested_s > 0 and .bracket >= 1)) and .longest_s >= .suggested_s' \
+    look.json >tell.out || fail "the dry run suggests nothing: $(cat look.json)"
+"$weft" capture own.set --rig r -q --exposure each,3:0.01 --bracket auto,3:3,4:2 --sidecar --name "Harris Tweed/7" \
+    --file-name "{set}_{kind}{light}_{exposure}" --json >own.json || fail "capture of single lights"
+jq -e '.shortest_s == 0.01 and .exposure_s > 0.01' own.json >tell.out || fail "exposures: $(cat own.json)"
+jq -e '[.frames[] | select(.light == 3) | .exposure_s] == [0.01, 0.0025, 0.04]' own.set/set.json >tell.out ||
+    fail "light 3 has not the bracket that was asked for"
+jq -e '[.frames[] | select(.light == 4)] | length == 2 and .[1].exposure_s / .[0].exposure_s > 3.9' own.set/set.json \
+    >tell.out || fail "light 4 has not the bracket that was asked for"
+jq -e '[.frames[] | select(.role == "light" and .light != 3 and (.capture.bracket // 0) == 0)
+    | .capture.statistics.high | max > 0.6 and max < 0.8] | all' own.set/set.json >tell.out ||
+    fail "a light's own exposure misses 70 %: $(jq -c '[.frames[].capture.statistics.high]' own.set/set.json)"
+[ -f own.set/Harris-Tweed-7_light03_0.0025s.dng ] || fail "names: $(ls own.set)"
+jq -e --slurpfile set own.set/set.json '.frame == ($set[0].frames[] | select(.light == 3 and .capture.bracket == 0))' \
+    own.set/Harris-Tweed-7_light03_0.0025s.dng.json >tell.out || fail "a sidecar differs from set.json"
+"$weft" rig --dir r --tell "truth t" >tell.out || fail "truth"
+"$weft" solve own.set -c t/truth.cal -o own.maps -q || fail "solve of the set with brackets"
 
 # A relative folder is the client's, not the rig's.
 mkdir elsewhere
