@@ -1,8 +1,10 @@
 /*
  * weft-docs cli|errors: writes docs/cli.md and docs/errors.md from the tables of the program.
  * A test compares them, so the documents cannot become stale.
+ * weft-docs man DIR DATE: the manual pages; the build does that, into build/man.
  */
 #include "host/cli/command.h"
+#include "host/cli/docs_man.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -11,38 +13,30 @@ static void print_rows(const weft_field *fields)
 {
     fputs("\n| option | value | default | does |\n| --- | --- | --- | --- |\n", stdout);
     for (const weft_field *f = fields; f && f->key; f++) {
-        char value[160] = "";
-        if (f->type == WEFT_FIELD_CHOICE) {
-            size_t n = 0;
-            for (const char *c = f->choices; *c && n + 2 < sizeof value; c++) { /* a bar would end the cell */
-                if (*c == '|')
-                    value[n++] = '\\';
-                value[n++] = *c;
-            }
-            value[n] = '\0';
-        } else if (f->type != WEFT_FIELD_FLAG) {
-            snprintf(value, sizeof value, "%s", f->unit ? f->unit : f->type == WEFT_FIELD_SIZE ? "WxH" : "");
-            if (f->min != 0 || f->max != 0)
-                snprintf(value + strlen(value), sizeof value - strlen(value), "%s%g to %g",
-                         value[0] ? ", " : "", f->min, f->max);
+        char value[160], cell[320];
+        size_t n = 0;
+        weft_docs_value(f, value);
+        for (const char *c = value; *c; c++) { /* a bar would end the cell */
+            if (*c == '|')
+                cell[n++] = '\\';
+            cell[n++] = *c;
         }
+        cell[n] = '\0';
         printf("| `--%s`", f->key);
         if (f->short_opt)
             printf(" `-%c`", f->short_opt);
-        printf(" | %s | %s | %s%s |\n", value, f->def ? f->def : "", f->help, f->required ? " (needed)" : "");
+        printf(" | %s | %s | %s%s |\n", cell, f->def ? f->def : "", f->help, f->required ? " (needed)" : "");
     }
 }
 
 static void print_cli(void)
 {
     fputs("# The command line\n\n"
-          "Written by `build/bin/weft-docs cli`; do not edit.\n\n"
-          "Results go to stdout, everything else to stderr.\n"
-          "Exit status: 0 done, 1 it failed (one line says what, which file, what to do), 2 wrong usage, 130 "
-          "cancelled.\n"
-          "Nothing is overwritten without `--force`.\n\n"
-          "Every command has these options:\n",
+          "Written by `build/bin/weft-docs cli`; do not edit.\n\n",
           stdout);
+    for (const char *const *rule = weft_docs_rules; *rule; rule++)
+        printf("%s\n", *rule);
+    fputs("\nEvery command has these options:\n", stdout);
     print_rows(weft_common_fields);
     for (const weft_command *const *c = weft_commands; *c; c++) {
         printf("\n## weft %s\n\n%s.\n\n    weft %s%s%s%s\n", (*c)->name, (*c)->summary, (*c)->name,
@@ -69,12 +63,18 @@ static void print_errors(void)
 
 int main(int argc, char **argv)
 {
+    weft_error error = {0};
     if (argc == 2 && strcmp(argv[1], "cli") == 0)
         print_cli();
     else if (argc == 2 && strcmp(argv[1], "errors") == 0)
         print_errors();
-    else {
-        fputs("usage: weft-docs cli|errors\n", stderr);
+    else if (argc == 4 && strcmp(argv[1], "man") == 0) {
+        if (weft_docs_write_man(argv[2], argv[3], &error) != WEFT_OK) {
+            fprintf(stderr, "weft-docs: %s\n", error.text);
+            return 1;
+        }
+    } else {
+        fputs("usage: weft-docs cli|errors|man DIR DATE\n", stderr);
         return 2;
     }
     return 0;

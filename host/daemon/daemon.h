@@ -17,6 +17,8 @@ typedef struct weft_daemon_options {
 
 /** Ends with {0}. */
 extern const weft_field weft_daemon_fields[];
+/** For --help and the manual: one line, paragraphs, lines to type. */
+extern const char weft_daemon_summary[], weft_daemon_details[], weft_daemon_example[];
 
 /** Serves until SIGTERM or SIGINT.  @return WEFT_OK when it was asked to end */
 weft_err weft_daemon_run(const weft_daemon_options *options, weft_error *err);

@@ -39,3 +39,10 @@ const weft_field weft_daemon_fields[] = {
     {0},
 };
 /* clang-format on */
+
+const char weft_daemon_summary[] = "serves the scanner, a queue of jobs and a library over HTTP";
+const char weft_daemon_details[] =
+    "Jobs are weft commands in processes of their own.  The API is described at /v1/openapi.json and in\n"
+    "docs/daemon.md.  SIGTERM switches the lights off, ends what runs and keeps it queued.";
+const char weft_daemon_example[] = "weftd --library ~/scans --socket /tmp/weftd.sock &\n"
+                                   "curl --unix-socket /tmp/weftd.sock http://localhost/v1/jobs";

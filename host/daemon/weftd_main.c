@@ -9,16 +9,15 @@
 
 static void print_help(void)
 {
-    fputs(
-        "weftd: serves the scanner, a queue of jobs and a library over HTTP\n\n"
-        "usage: weftd --library DIR [OPTIONS]\n\n"
-        "Jobs are weft commands in processes of their own.  The API is described at /v1/openapi.json and in\n"
-        "docs/daemon.md.  SIGTERM switches the lights off, ends what runs and keeps it queued.\n\noptions:\n",
-        stdout);
+    printf("weftd: %s\n\nusage: weftd --library DIR [OPTIONS]\n\n%s\n\noptions:\n", weft_daemon_summary,
+           weft_daemon_details);
     weft_fields_print_help(weft_daemon_fields, stdout);
-    fputs("\nexample:\n  weftd --library ~/scans --socket /tmp/weftd.sock &\n"
-          "  curl --unix-socket /tmp/weftd.sock http://localhost/v1/jobs\n",
-          stdout);
+    fputs("\nexample:\n", stdout);
+    for (const char *line = weft_daemon_example; *line;) {
+        const size_t n = strcspn(line, "\n");
+        printf("  %.*s\n", (int)n, line);
+        line += n + (line[n] == '\n');
+    }
 }
 
 static bool asks(int argc, char **argv, const char *option)
