@@ -25,6 +25,11 @@ static float reciprocal_strength(const lattice *l, int light, int channel, doubl
     return strength > 0 ? (float)(1 / strength) : NAN;
 }
 
+static float over_distance(const weft_light *light, weft_vec3 point)
+{
+    return light->distant ? 1.0F : (float)(1 / weft_length(weft_sub(light->position, point)));
+}
+
 /* The planes of a node at solved pixel (i, j), which lies in the frame. */
 static void evaluate(const lattice *l, double i, double j, float *planes)
 {
@@ -37,7 +42,8 @@ static void evaluate(const lattice *l, double i, double j, float *planes)
     for (int light = 0; light < l->to->n_lights; light++) {
         const double at = weft_light_at(&l->cal->lights[light], point, &to_light);
         for (int c = 0; c < 3; c++)
-            planes[2 + 3 * light + c] = reciprocal_strength(l, light, c, at, u, v);
+            planes[WEFT_INCIDENCE_STRENGTH(light, c)] = reciprocal_strength(l, light, c, at, u, v);
+        planes[WEFT_INCIDENCE_OVER_DISTANCE(light)] = over_distance(&l->cal->lights[light], point);
     }
 }
 

@@ -11,8 +11,12 @@
 
 #include "calibration/calibration.h"
 
-/** Planes of a node: world x and y (mm), then per light and channel the reciprocal of its strength. */
-#define WEFT_INCIDENCE_PLANES(n_lights) (2 + 3 * (n_lights))
+/** Planes of a node: world x and y (mm), then four per light: the reciprocal of its strength in the three
+ *  channels, and the reciprocal of its distance (1/mm; 1 when it is distant), from which one step of Newton
+ *  finds that of any pixel between without a root and a division. */
+#define WEFT_INCIDENCE_PLANES(n_lights)     (2 + 4 * (n_lights))
+#define WEFT_INCIDENCE_STRENGTH(light, c)   (2 + 4 * (light) + (c))
+#define WEFT_INCIDENCE_OVER_DISTANCE(light) (2 + 4 * (light) + 3)
 
 typedef struct weft_incidence {
     int n_lights;

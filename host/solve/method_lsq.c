@@ -11,8 +11,7 @@ static WEFT_CLONES void solve_lsq(const weft_solve_samples *restrict samples,
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
         weft_lane_solve(&t, k, &scaled, answers);
-    for (int c = 0; c < samples->n_channels; c++)
-        weft_lane_albedo(samples, NULL, c, &scaled, answers);
+    weft_lane_albedos(samples, NULL, &t, &scaled, answers);
     weft_lane_measure(samples, NULL, &scaled, &m);
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++) {

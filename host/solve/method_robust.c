@@ -32,8 +32,7 @@ WEFT_INLINE void judge(const weft_solve_samples *s, const weft_lane_weights *wei
                        const weft_lane_normals *scaled, const weft_lane_misfits *m,
                        const float dropped[WEFT_LANES], const float mark[WEFT_LANES], weft_solve_answers *a)
 {
-    for (int c = 0; c < s->n_channels; c++)
-        weft_lane_albedo(s, weights, c, scaled, a);
+    weft_lane_albedos(s, weights, t, scaled, a);
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++) {
         weft_lane_judge(t, scaled, m, k, a);

@@ -167,6 +167,23 @@ WEFT_INLINE void weft_lane_albedo(const weft_solve_samples *s, const weft_lane_w
         a->albedo[c][k] = scaled->gain[k] * sum[k];
 }
 
+/** The same of all channels.  A site of a mosaic has one colour, which is its grey: the sum of I' (n.l) over
+ *  the lights is then n.b, which is there already. */
+WEFT_INLINE void weft_lane_albedos(const weft_solve_samples *s, const weft_lane_weights *weights,
+                                   const weft_lane_sums *t, const weft_lane_normals *scaled,
+                                   weft_solve_answers *a)
+{
+    if (s->n_channels == 1) {
+#pragma omp simd
+        for (int k = 0; k < WEFT_LANES; k++)
+            a->albedo[0][k] = scaled->gain[k] * (a->normal[0][k] * t->bx[k] + a->normal[1][k] * t->by[k] +
+                                                 a->normal[2][k] * t->bz[k]);
+        return;
+    }
+    for (int c = 0; c < s->n_channels; c++)
+        weft_lane_albedo(s, weights, c, scaled, a);
+}
+
 /** How well the samples of the weights fit. */
 typedef struct weft_lane_misfits {
     float squares[WEFT_LANES];   /* sum (I' - fit)^2 */

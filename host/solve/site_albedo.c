@@ -70,21 +70,19 @@ static weft_err fill_holes(weft_image *mosaic, const weft_mask *mask, weft_error
     return status;
 }
 
-weft_err weft_site_albedo_finish(weft_maps *maps, weft_cfa cfa, weft_error *err)
+weft_err weft_site_albedo_finish(weft_maps *maps, weft_cfa cfa, weft_site_done_fn *done, void *context,
+                                 weft_error *err)
 {
     const size_t n = weft_image_plane_size(&maps->albedo);
-    weft_image mosaic = {0}, rgb = {0};
+    weft_image mosaic = {0};
+    WEFT_TRY(weft_site_require_size(maps->width, maps->height, err));
     WEFT_TRY(weft_image_init(&mosaic, maps->width, maps->height, 1, err));
     memcpy(mosaic.data, maps->albedo.data, n * sizeof *mosaic.data);
     weft_err status = WEFT_OK;
     if (memchr(maps->mask.data, 0, n))
         status = fill_holes(&mosaic, &maps->mask, err);
     if (status == WEFT_OK)
-        status = weft_site_demosaic(&mosaic, cfa, &rgb, err);
+        weft_site_demosaic_into(&mosaic, cfa, &maps->albedo, done, context);
     weft_image_fini(&mosaic);
-    if (status != WEFT_OK)
-        return status;
-    weft_image_fini(&maps->albedo);
-    maps->albedo = rgb;
-    return WEFT_OK;
+    return status;
 }

@@ -6,9 +6,28 @@
 #include <math.h>
 #include <string.h>
 
-/* Pixels around the picture, mirrored so that parity and colour are kept; to the right there are LANES more,
- * so that whole vectors can be read. */
-enum { PAD = 8, REACH = 4, AROUND = 2, LEAST = PAD + 2, LANES = 16, MOST_SITES = 6 };
+/*
+ * The picture is worked on in tiles of STRIP columns and TILE_ROWS rows, and a tile row by row: each step is
+ * done once per row, as soon as the rows that it looks at are there, and only the last RING rows of it are
+ * kept.  So a tile stays in the second-level cache, and nothing of the size of the picture is made but the
+ * answer.  A pixel's value does not depend on the tile that it falls into.
+ */
+enum {
+    PAD = 10, /* columns around a strip; even, so that a column's parity tells its colour */
+    STRIP = 256,
+    LANES = 16,
+    SPAN = (STRIP + 2 * PAD + 2 * LANES - 1) / (2 * LANES) * (2 * LANES),
+    MARGIN =
+        LANES, /* beside a row, so that steps need not know where it ends: what they make there is not used */
+    ROW = MARGIN + SPAN + MARGIN,
+    HALF = MARGIN + SPAN / 2 + MARGIN,
+    TILE_ROWS = 128,
+    RING = 16,
+    LEAST = 10
+};
+
+/* How many rows a step lags behind the reading of rows, because of those below that it looks at. */
+enum { LAG_DIFFERENCE = 2, LAG_TURN = 3, LAG_BOX = 5, LAG_GREEN = 7, LAG_COLOUR = 9 };
 
 /* Greens that differ by less than this part of their sum count as alike: a few times the noise. */
 static const float alike = 0.05F;
@@ -16,260 +35,337 @@ static const float alike = 0.05F;
 typedef struct demosaic_job {
     const weft_image *mosaic;
     weft_cfa cfa;
-    weft_image padded; /* 1 plane */
+    weft_image *rgb;
+    weft_site_done_fn *done;
+    void *context;
+    int strips; /* to a row of tiles */
+} demosaic_job;
+
+/* The last rows of each step; column u of the strip is at u + PAD of a row. */
+typedef struct ring {
+    float row[RING][ROW];
+} ring;
+
+/* What is known of a row's pixels of one parity.  Green; the tolerance within which it is alike; of the
+ * parity whose sites are not green also the difference of green and their colour. */
+typedef struct halves {
+    float green[HALF], near[HALF], difference[HALF];
+} halves;
+
+typedef struct tile {
+    const demosaic_job *job;
+    int left, top, width, height; /* of the picture's part that is to be made */
+    int span;                     /* width and PAD on both sides, in whole vectors */
+    ring site;
     /* Green minus the other colour of the row, and of the column, estimated at every pixel: green's own site
      * takes the other colour from its neighbours, the other's site green. */
-    weft_image along; /* 2 planes: rows, columns */
-    weft_image turn;  /* 2 planes: how much `along` changes from the neighbour before to the one after */
-    weft_image green; /* 1 plane, padded too: green everywhere */
-    weft_image *rgb;
-} demosaic_job;
+    ring across, along;
+    /* How much these change from the neighbour before to the one after, over five pixels of a row. */
+    ring turn_across, turn_along;
+    /* Of five rows: the change, and the mean of `along`. */
+    ring box_along, mean_along;
+    halves own[RING], green[RING]; /* of the sites that have another colour, and of green's */
+} tile;
+
+static inline float *row_of(ring *r, int row)
+{
+    return r->row[row & (RING - 1)] + MARGIN;
+}
 
 static int mirror(int i, int n)
 {
-    return i < 0 ? -i : i >= n ? 2 * (n - 1) - i : i;
+    const int inside = i < 0 ? -i : i >= n ? 2 * (n - 1) - i : i;
+    return inside < 0 ? 0 : inside >= n ? n - 1 : inside;
 }
 
-/* Mirrors the margins of a padded row from what stands in its middle. */
-static void mirror_row(float *row, int width)
+/* Parity of the columns whose sites are not green. */
+static int coloured(const tile *t, int row)
 {
-    for (int i = 0; i < PAD; i++) {
-        row[i] = row[PAD + mirror(i - PAD, width)];
-        row[PAD + width + i] = row[PAD + mirror(width + i, width)];
-    }
+    return weft_cfa_colour(t->job->cfa, 0, row) == 1 ? 1 : 0;
 }
 
-static void pad_rows(void *context, int band, int row_begin, int row_end)
+/* A row of the mosaic and its margins; beyond the picture it is mirrored, which keeps parity and colour. */
+static void read_row(tile *t, int row)
 {
-    demosaic_job *const job = context;
-    const weft_image *const m = job->mosaic;
-    (void)band;
-    for (int v = row_begin; v < row_end; v++) {
-        float *const to = weft_image_row(&job->padded, 0, v);
-        memcpy(to + PAD, weft_image_row(m, 0, mirror(v - PAD, m->height)), (size_t)m->width * sizeof *to);
-        mirror_row(to, m->width);
-    }
+    const weft_image *const m = t->job->mosaic;
+    const float *const from = weft_image_row(m, 0, mirror(row, m->height));
+    float *const to = row_of(&t->site, row);
+    const int first = t->left - PAD, before = first < 0 ? -first : 0;
+    const int after = first + t->span > m->width ? first + t->span - m->width : 0;
+    memcpy(to + before, from + first + before, (size_t)(t->span - before - after) * sizeof *to);
+    for (int i = 0; i < before; i++)
+        to[i] = from[mirror(first + i, m->width)];
+    for (int i = t->span - after; i < t->span; i++)
+        to[i] = from[mirror(first + i, m->width)];
 }
 
-/* Colour of a padded pixel: PAD is even, so the phase is the mosaic's. */
-static bool is_green(const demosaic_job *job, int u, int v)
+WEFT_INLINE void find_differences(tile *t, int row)
 {
-    return weft_cfa_colour(job->cfa, u, v) == 1;
-}
-
-WEFT_CLONES static void difference_rows(void *context, int band, int row_begin, int row_end)
-{
-    demosaic_job *const job = context;
-    const weft_image *const p = &job->padded;
-    const int width = p->width;
-    (void)band;
-    for (int v = row_begin; v < row_end; v++) {
-        if (v < 2 || v >= p->height - 2)
-            continue;
-        const float *const c = weft_image_row(p, 0, v);
-        const float *const up = c - width, *const up2 = up - width, *const down = c + width,
-                           *const down2 = down + width;
-        float *const across = weft_image_row(&job->along, 0, v), *const along =
-                                                                     weft_image_row(&job->along, 1, v);
-        const float even = is_green(job, 0, v) ? 1.0F : -1.0F;
-        WEFT_INDEPENDENT
-        for (int u = 2; u < width - 2; u++) {
+    const float *const c = row_of(&t->site, row);
+    const float *const up = row_of(&t->site, row - 1), *const up2 = row_of(&t->site, row - 2);
+    const float *const down = row_of(&t->site, row + 1), *const down2 = row_of(&t->site, row + 2);
+    float *const across = row_of(&t->across, row), *const along = row_of(&t->along, row);
+    const float even = coloured(t, row) ? 1.0F : -1.0F;
+    for (int first = 0; first < t->span; first += LANES)
+#pragma omp simd
+        for (int u = first; u < first + LANES; u++) {
             const float sign = u & 1 ? -even : even;
             const float h = 0.5F * (c[u - 1] + c[u + 1]) + 0.25F * (2 * c[u] - c[u - 2] - c[u + 2]);
-            const float t = 0.5F * (up[u] + down[u]) + 0.25F * (2 * c[u] - up2[u] - down2[u]);
+            const float v = 0.5F * (up[u] + down[u]) + 0.25F * (2 * c[u] - up2[u] - down2[u]);
             across[u] = sign * (c[u] - h);
-            along[u] = sign * (c[u] - t);
+            along[u] = sign * (c[u] - v);
         }
-    }
 }
 
-WEFT_CLONES static void turn_rows(void *context, int band, int row_begin, int row_end)
+/* to[u] = scale times the sum of five neighbours. */
+WEFT_INLINE void add_columns(const float *from, float scale, int span, float *to)
 {
-    demosaic_job *const job = context;
-    const int width = job->along.width;
-    (void)band;
-    for (int v = row_begin; v < row_end; v++) {
-        if (v < 3 || v >= job->along.height - 3)
-            continue;
-        const float *const across = weft_image_row(&job->along, 0, v);
-        const float *const above = weft_image_row(&job->along, 1, v - 1);
-        const float *const below = weft_image_row(&job->along, 1, v + 1);
-        float *const turn_across = weft_image_row(&job->turn, 0, v);
-        float *const turn_down = weft_image_row(&job->turn, 1, v);
-        WEFT_INDEPENDENT
-        for (int u = 3; u < width - 3; u++) {
-            turn_across[u] = fabsf(across[u + 1] - across[u - 1]);
-            turn_down[u] = fabsf(below[u] - above[u]);
+    for (int first = 0; first < span; first += LANES)
+#pragma omp simd
+        for (int u = first; u < first + LANES; u++)
+            to[u] = scale * ((from[u - 2] + from[u - 1]) + from[u] + (from[u + 1] + from[u + 2]));
+}
+
+WEFT_INLINE void add_rows(ring *from, int row, float scale, int span, float *to)
+{
+    const float *const a = row_of(from, row - 2), *const b = row_of(from, row - 1),
+                       *const c = row_of(from, row), *const d = row_of(from, row + 1),
+                       *const e = row_of(from, row + 2);
+    for (int first = 0; first < span; first += LANES)
+#pragma omp simd
+        for (int u = first; u < first + LANES; u++)
+            to[u] = scale * ((a[u] + b[u]) + c[u] + (d[u] + e[u]));
+}
+
+WEFT_INLINE void find_turns(tile *t, int row)
+{
+    float across[ROW] = {0}, along[ROW] = {0};
+    const float *const here = row_of(&t->across, row);
+    const float *const above = row_of(&t->along, row - 1), *const below = row_of(&t->along, row + 1);
+    for (int first = 0; first < t->span; first += LANES)
+#pragma omp simd
+        for (int u = first; u < first + LANES; u++) {
+            across[MARGIN + u] = fabsf(here[u + 1] - here[u - 1]);
+            along[MARGIN + u] = fabsf(below[u] - above[u]);
         }
-    }
+    add_columns(across + MARGIN, 1, t->span, row_of(&t->turn_across, row));
+    add_columns(along + MARGIN, 1, t->span, row_of(&t->turn_along, row));
 }
 
-/* Mean of the difference over a direction's five pixels, and the inverse square of its change there, of LANES
- * pixels from padded (u, v) on.  The window is five wide across the direction. */
-WEFT_INLINE void look(const demosaic_job *job, int plane, int u, int v, int du, int dv, float sum[LANES],
-                      float sum_weight[LANES])
+/* The reciprocal of a direction's weight: the square of the change in it.  The bounds keep products of three
+ * within a float's range, so that one division is enough. */
+WEFT_INLINE float doubt(float change)
 {
-    const int side_u = dv ? 1 : 0, side_v = du ? 1 : 0;
-    float mean[LANES] = {0}, change[LANES];
-    for (int k = 0; k < LANES; k++)
-        change[k] = 1e-6F;
-    for (int i = 0; i <= REACH; i++) {
-        const int at_u = u + i * du, at_v = v + i * dv;
-        const float *const a = weft_image_row(&job->along, plane, at_v) + at_u;
+    const float c = 100 * change + 1e-4F, square = c * c;
+    return square < 1e8F ? square : 1e8F;
+}
+
+/* Green of a row: the site's own, or its colour plus the mean difference of the four directions, those in
+ * which it changes least first.  A direction's mean is over five pixels, its change over five by five. */
+WEFT_INLINE void estimate_green(tile *t, int row, float *estimate)
+{
+    float mean_row[ROW] = {0},
+          box_row[ROW] = {0}, *const mean = mean_row + MARGIN, *const box = box_row + MARGIN;
+    const float *const own = row_of(&t->site, row);
+    const float *const mean_up = row_of(&t->mean_along, row - 2);
+    const float *const mean_down = row_of(&t->mean_along, row + 2);
+    const float *const box_up = row_of(&t->box_along, row - 2), *const box_down =
+                                                                    row_of(&t->box_along, row + 2);
+    add_rows(&t->turn_across, row, 1, t->span, box);
+    add_columns(row_of(&t->across, row), 0.2F, t->span, mean);
+    for (int first = 0; first < t->span; first += LANES)
 #pragma omp simd
-        for (int k = 0; k < LANES; k++)
-            mean[k] += 0.2F * a[k];
-        for (int j = -2; j <= 2; j++) {
-            const int side = at_u + j * side_u;
-            const float *const t = weft_image_row(&job->turn, plane, at_v + j * side_v) + side;
-#pragma omp simd
-            for (int k = 0; k < LANES; k++)
-                change[k] += t[k];
+        for (int u = first; u < first + LANES; u++) {
+            const float l = doubt(box[u - 2]), r = doubt(box[u + 2]);
+            const float a = doubt(box_up[u]), b = doubt(box_down[u]);
+            const float lr = l * r, ab = a * b;
+            const float sum =
+                ab * (mean[u - 2] * r + mean[u + 2] * l) + lr * (mean_up[u] * b + mean_down[u] * a);
+            estimate[u] = own[u] + sum / (ab * (l + r) + lr * (a + b));
         }
-    }
-#pragma omp simd
-    for (int k = 0; k < LANES; k++) {
-        const float weight = 1 / (change[k] * change[k]);
-        sum[k] += weight * mean[k];
-        sum_weight[k] += weight;
-    }
 }
 
-WEFT_CLONES static void green_rows(void *context, int band, int row_begin, int row_end)
+WEFT_INLINE void find_green(tile *t, int row)
 {
-    demosaic_job *const job = context;
-    const int width = job->mosaic->width;
-    (void)band;
-    for (int v = row_begin + PAD; v < row_end + PAD; v++) {
-        const float *const own = weft_image_row(&job->padded, 0, v);
-        float *const to = weft_image_row(&job->green, 0, v);
-        const int odd_is_green = is_green(job, 1, v);
-        for (int u = PAD; u < PAD + width; u += LANES) {
-            float sum[LANES] = {0}, weight[LANES] = {0};
-            look(job, 0, u, v, 1, 0, sum, weight);
-            look(job, 0, u, v, -1, 0, sum, weight);
-            look(job, 1, u, v, 0, 1, sum, weight);
-            look(job, 1, u, v, 0, -1, sum, weight);
+    float estimate[SPAN];
+    const float *const own = row_of(&t->site, row);
+    const int p = coloured(t, row);
+    halves *const at_own = &t->own[row & (RING - 1)], *const at_green = &t->green[row & (RING - 1)];
+    estimate_green(t, row, estimate);
+    for (int first = 0; first < t->span / 2; first += LANES)
 #pragma omp simd
-            for (int k = 0; k < LANES; k++)
-                to[u + k] = (k & 1) == odd_is_green ? own[u + k] : own[u + k] + sum[k] / weight[k];
+        for (int i = first; i < first + LANES; i++) {
+            const float found = estimate[2 * i + p], here = own[2 * i + 1 - p];
+            at_own->green[MARGIN + i] = found;
+            at_own->near[MARGIN + i] = alike * fabsf(found) + 0.5e-3F;
+            at_own->difference[MARGIN + i] = found - own[2 * i + p];
+            at_green->green[MARGIN + i] = here;
+            at_green->near[MARGIN + i] = alike * fabsf(here) + 0.5e-3F;
         }
-        mirror_row(to, width);
-    }
 }
 
-/* The rows above and below the picture, as in the mosaic. */
-static void mirror_green(demosaic_job *job)
+/* A mean sum (d / q) over sum (1 / q) is kept as fractions of a common denominator, so that one division is
+ * enough; the bound of q keeps products of six within a float's range. */
+typedef struct fraction {
+    float above, below, common;
+} fraction;
+
+WEFT_INLINE void add_site(fraction *f, const float *site, int i, float green, float near, float away)
 {
-    const int height = job->mosaic->height;
-    const size_t bytes = (size_t)job->green.width * sizeof(float);
-    for (int i = 1; i <= AROUND; i++) {
-        memcpy(weft_image_row(&job->green, 0, PAD - i), weft_image_row(&job->green, 0, PAD + i), bytes);
-        memcpy(weft_image_row(&job->green, 0, PAD + height - 1 + i),
-               weft_image_row(&job->green, 0, PAD + height - 1 - i), bytes);
-    }
+    const float *const difference = site + offsetof(halves, difference) / sizeof(float);
+    const float *const site_near = site + offsetof(halves, near) / sizeof(float);
+    const float apart = site[i] - green, tolerance = site_near[i] + near;
+    const float wide = (apart * apart + tolerance * tolerance) * away;
+    const float q = wide < 1e5F ? wide : 1e5F;
+    f->above = f->above * q + difference[i] * f->common;
+    f->below = f->below * q + f->common;
+    f->common *= q;
 }
 
-/* Where a colour's sites lie around pixels of one parity. */
-typedef struct site_list {
-    bool own; /* the pixels themselves are of the colour */
-    int n, du[MOST_SITES], dv[MOST_SITES];
-} site_list;
-
-static site_list sites_around(weft_cfa cfa, int colour, int u, int v)
+/* A colour beside its sites: green less the mean difference of the sites near by, those of like green first.
+ * The two nearest, and four that are further: `away` is 1 + the square of their distance, times 5.
+ *
+ * @param site  the green of the first pixel's sites */
+WEFT_CLONES static void colour_beside(const float *const site[6], const halves *at, int span,
+                                      float *restrict to)
 {
-    site_list s = {.own = weft_cfa_colour(cfa, u, v) == colour};
-    for (int dv = -AROUND; dv <= AROUND && !s.own; dv++)
-        for (int du = -AROUND; du <= AROUND; du++)
-            if (weft_cfa_colour(cfa, u + du + 2, v + dv + 2) == colour) {
-                s.du[s.n] = du;
-                s.dv[s.n++] = dv;
-            }
-    return s;
-}
-
-/* A colour of LANES pixels from padded (u, v) on, for those of parity `odd`: green less the mean difference
- * of the sites near by, those of like green first. */
-WEFT_INLINE void colour_lanes(const demosaic_job *job, const site_list *s, int odd, int u, int v,
-                              float to[LANES])
-{
-    const float *const here = weft_image_row(&job->green, 0, v) + u, *const own =
-                                                                         weft_image_row(&job->padded, 0, v) +
-                                                                         u;
-    float sum[LANES] = {0}, sum_weight[LANES];
-    for (int k = 0; k < LANES; k++)
-        sum_weight[k] = s->own ? 1.0F : 0.0F;
-    for (int i = 0; i < s->n; i++) {
-        const float *const green = weft_image_row(&job->green, 0, v + s->dv[i]) + u + s->du[i];
-        const float *const value = weft_image_row(&job->padded, 0, v + s->dv[i]) + u + s->du[i];
-        const float away = (float)(1 + s->du[i] * s->du[i] + s->dv[i] * s->dv[i]);
+    const float *const a = site[0], *const b = site[1], *const c = site[2], *const d = site[3],
+                       *const e = site[4], *const g = site[5];
+    const float *const green = at->green + MARGIN, *const near = at->near + MARGIN;
+    for (int first = 0; first < span; first += LANES)
 #pragma omp simd
-        for (int k = 0; k < LANES; k++) {
-            const float apart = green[k] - here[k], near = alike * (fabsf(green[k]) + fabsf(here[k])) + 1e-3F;
-            const float weight = 1 / ((apart * apart + near * near) * away);
-            sum[k] += weight * (green[k] - value[k]);
-            sum_weight[k] += weight;
+        for (int i = first; i < first + LANES; i++) {
+            fraction f = {0, 0, 1};
+            add_site(&f, a, i, green[i], near[i], 10);
+            add_site(&f, b, i, green[i], near[i], 10);
+            add_site(&f, c, i, green[i], near[i], 30);
+            add_site(&f, d, i, green[i], near[i], 30);
+            add_site(&f, e, i, green[i], near[i], 30);
+            add_site(&f, g, i, green[i], near[i], 30);
+            to[i] = green[i] - f.above / f.below;
         }
-    }
+}
+
+/* A colour amid four of its sites. */
+WEFT_CLONES static void colour_amid(const float *const site[4], const halves *at, int span,
+                                    float *restrict to)
+{
+    const float *const a = site[0], *const b = site[1], *const c = site[2], *const d = site[3];
+    const float *const green = at->green + MARGIN, *const near = at->near + MARGIN;
+    for (int first = 0; first < span; first += LANES)
 #pragma omp simd
-    for (int k = 0; k < LANES; k++) {
-        const float found = s->own ? own[k] : here[k] - sum[k] / sum_weight[k];
-        to[k] = (k & 1) == odd ? found : to[k];
+        for (int i = first; i < first + LANES; i++) {
+            fraction f = {0, 0, 1};
+            add_site(&f, a, i, green[i], near[i], 10);
+            add_site(&f, b, i, green[i], near[i], 10);
+            add_site(&f, c, i, green[i], near[i], 10);
+            add_site(&f, d, i, green[i], near[i], 10);
+            to[i] = green[i] - f.above / f.below;
+        }
+}
+
+/* Pixels of two parities side by side again, the tile's `width` of them. */
+WEFT_INLINE void interleave(const tile *t, const float *even, const float *odd, float *to)
+{
+    float row[SPAN];
+    for (int first = 0; first < t->span / 2; first += LANES)
+#pragma omp simd
+        for (int i = first; i < first + LANES; i++) {
+            row[2 * i] = even[i];
+            row[2 * i + 1] = odd[i];
+        }
+    memcpy(to + t->left, row + PAD, (size_t)t->width * sizeof *to);
+}
+
+WEFT_INLINE void find_colours(tile *t, int row)
+{
+    const int p = coloured(t, row), q = 1 - p, l = p ? -1 : 0, r = p ? 0 : 1; /* beside a green one */
+    const float *site[5];
+    for (int i = 0; i < 5; i++)
+        site[i] = t->own[(row - 2 + i) & (RING - 1)].green + MARGIN;
+    const float *const above = site[1], *const below = site[3]; /* where the other colour's sites are */
+    const float *const mine_beside[6] = {site[2] + l, site[2] + r, site[0] + l,
+                                         site[0] + r, site[4] + l, site[4] + r};
+    const float *const other_amid[4] = {above - r, above - l, below - r, below - l};
+    const float *const other_beside[6] = {above, below, above - 1, above + 1, below - 1, below + 1};
+    const halves *const at_own = &t->own[row & (RING - 1)], *const at_green = &t->green[row & (RING - 1)];
+    const weft_image *const rgb = t->job->rgb;
+    const int colour = weft_cfa_colour(t->job->cfa, p, row), half = t->span / 2;
+    const float *const here = row_of(&t->site, row), *green[2];
+    float mine[2][SPAN / 2], other[2][SPAN / 2];
+    colour_beside(mine_beside, at_green, half, mine[q]);
+    colour_amid(other_amid, at_own, half, other[p]);
+    colour_beside(other_beside, at_green, half, other[q]);
+    for (int first = 0; first < half; first += LANES)
+#pragma omp simd
+        for (int i = first; i < first + LANES; i++)
+            mine[p][i] = here[2 * i + p];
+    green[p] = at_own->green + MARGIN;
+    green[q] = at_green->green + MARGIN;
+    interleave(t, mine[0], mine[1], weft_image_row(rgb, colour, row));
+    interleave(t, other[0], other[1], weft_image_row(rgb, 2 - colour, row));
+    interleave(t, green[0], green[1], weft_image_row(rgb, 1, row));
+}
+
+/* One row more, and what it makes possible. */
+WEFT_CLONES static void step(tile *t, int row)
+{
+    const int first = t->top, last = t->top + t->height;
+    read_row(t, row);
+    if (row - LAG_DIFFERENCE >= first - 7)
+        find_differences(t, row - LAG_DIFFERENCE);
+    if (row - LAG_TURN >= first - 6)
+        find_turns(t, row - LAG_TURN);
+    if (row - LAG_BOX >= first - 4) {
+        const int box = row - LAG_BOX;
+        add_rows(&t->turn_along, box, 1, t->span, row_of(&t->box_along, box));
+        add_rows(&t->along, box, 0.2F, t->span, row_of(&t->mean_along, box));
+    }
+    if (row - LAG_GREEN >= first - 2)
+        find_green(t, row - LAG_GREEN);
+    if (row - LAG_COLOUR >= first && row - LAG_COLOUR < last)
+        find_colours(t, row - LAG_COLOUR);
+}
+
+static void do_tile(void *context, int band, int row_begin, int row_end)
+{
+    const demosaic_job *const job = context;
+    const weft_image *const m = job->mosaic;
+    (void)row_begin, (void)row_end;
+    static _Thread_local tile t;
+    t.job = job;
+    t.left = band % job->strips * STRIP;
+    t.top = band / job->strips * TILE_ROWS;
+    t.width = m->width - t.left < STRIP ? m->width - t.left : STRIP;
+    t.height = m->height - t.top < TILE_ROWS ? m->height - t.top : TILE_ROWS;
+    t.span = (t.width + 2 * PAD + 2 * LANES - 1) / (2 * LANES) * (2 * LANES);
+    for (int row = t.top - LAG_COLOUR; row < t.top + t.height + LAG_COLOUR; row++) {
+        step(&t, row);
+        if (job->done && row - LAG_COLOUR >= t.top)
+            job->done(job->context, row - LAG_COLOUR, t.left, t.width);
     }
 }
 
-WEFT_CLONES static void colour_rows(void *context, int band, int row_begin, int row_end)
+void weft_site_demosaic_into(const weft_image *mosaic, weft_cfa cfa, weft_image *rgb, weft_site_done_fn *done,
+                             void *context)
 {
-    demosaic_job *const job = context;
-    const int width = job->mosaic->width;
-    (void)band;
-    for (int v = row_begin; v < row_end; v++) {
-        memcpy(weft_image_row(job->rgb, 1, v), weft_image_row(&job->green, 0, v + PAD) + PAD,
-               (size_t)width * sizeof(float));
-        for (int c = 0; c < 3; c += 2) {
-            const site_list even = sites_around(job->cfa, c, 0, v), odd = sites_around(job->cfa, c, 1, v);
-            for (int u = 0; u < width; u += LANES) {
-                float lanes[LANES] = {0};
-                const int n = width - u < LANES ? width - u : LANES;
-                colour_lanes(job, &even, 0, u + PAD, v + PAD, lanes);
-                colour_lanes(job, &odd, 1, u + PAD, v + PAD, lanes);
-                memcpy(weft_image_row(job->rgb, c, v) + u, lanes, (size_t)n * sizeof(float));
-            }
-        }
-    }
+    demosaic_job job = {mosaic, cfa, rgb, done, context, (mosaic->width + STRIP - 1) / STRIP};
+    const int tiles = job.strips * ((mosaic->height + TILE_ROWS - 1) / TILE_ROWS);
+    weft_parallel_rows(tiles * WEFT_BAND_ROWS, do_tile, &job); /* a tile a band */
+}
+
+weft_err weft_site_require_size(int width, int height, weft_error *err)
+{
+    if (width < LEAST || height < LEAST)
+        return weft_fail(err, WEFT_ERR_RANGE, "a mosaic of %d x %d pixels is too small (at least %d a side)",
+                         width, height, LEAST);
+    return WEFT_OK;
 }
 
 weft_err weft_site_demosaic(const weft_image *mosaic, weft_cfa cfa, weft_image *rgb, weft_error *err)
 {
-    const int width = mosaic->width + 2 * PAD + LANES, height = mosaic->height + 2 * PAD;
-    weft_image made = {0};
-    demosaic_job job = {.mosaic = mosaic, .cfa = cfa, .rgb = &made};
-    if (mosaic->width < LEAST || mosaic->height < LEAST)
-        return weft_fail(err, WEFT_ERR_RANGE, "a mosaic of %d x %d pixels is too small (at least %d a side)",
-                         mosaic->width, mosaic->height, LEAST);
-    weft_err status = weft_image_init(&job.padded, width, height, 1, err);
-    if (status == WEFT_OK)
-        status = weft_image_init(&job.along, width, height, 2, err);
-    if (status == WEFT_OK)
-        status = weft_image_init(&job.turn, width, height, 2, err);
-    if (status == WEFT_OK)
-        status = weft_image_init(&job.green, width, height, 1, err);
-    if (status == WEFT_OK) {
-        weft_parallel_rows(height, pad_rows, &job);
-        weft_parallel_rows(height, difference_rows, &job);
-        weft_parallel_rows(height, turn_rows, &job);
-        weft_parallel_rows(mosaic->height, green_rows, &job);
-        mirror_green(&job);
-    }
-    weft_image_fini(&job.along);
-    weft_image_fini(&job.turn);
-    if (status == WEFT_OK)
-        status = weft_image_init(&made, mosaic->width, mosaic->height, 3, err);
-    if (status == WEFT_OK) {
-        weft_parallel_rows(mosaic->height, colour_rows, &job);
-        *rgb = made;
-    }
-    weft_image_fini(&job.padded);
-    weft_image_fini(&job.green);
-    return status;
+    WEFT_TRY(weft_site_require_size(mosaic->width, mosaic->height, err));
+    WEFT_TRY(weft_image_init(rgb, mosaic->width, mosaic->height, 3, err));
+    weft_site_demosaic_into(mosaic, cfa, rgb, NULL, NULL);
+    return WEFT_OK;
 }

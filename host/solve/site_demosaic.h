@@ -20,4 +20,16 @@
  */
 weft_err weft_site_demosaic(const weft_image *mosaic, weft_cfa cfa, weft_image *rgb, weft_error *err);
 
+/** Told of every part of a row of `rgb` as it is made: `n` pixels from column `first` on, still in the cache.
+ *  From any thread. */
+typedef void weft_site_done_fn(void *context, int row, int first, int n);
+
+/** As above into planes that there are; `mosaic` is of a size that weft_site_require_size() allows.
+ *  @param done  NULL: nobody wants to know */
+void weft_site_demosaic_into(const weft_image *mosaic, weft_cfa cfa, weft_image *rgb, weft_site_done_fn *done,
+                             void *context);
+
+/** @return WEFT_ERR_RANGE for a mosaic that is too small */
+weft_err weft_site_require_size(int width, int height, weft_error *err);
+
 #endif

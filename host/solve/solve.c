@@ -119,33 +119,37 @@ static void solve_rows(void *context, int band, int row_begin, int row_end)
 
 static const float degrees = 57.2957795F;
 
-/* Colour, and nothing where the set's mask or the solver has no answer. */
-static void finish_rows(void *context, int band, int row_begin, int row_end)
+/* Colour, and nothing where the set's mask or the solver has no answer: of `n` pixels of a row. */
+static void finish_part(void *context, int row, int first, int n)
 {
     const solve_job *const job = context;
     weft_maps *const m = job->maps;
-    (void)band;
-    for (int row = row_begin; row < row_end; row++) {
-        const size_t at = (size_t)row * (size_t)m->width;
-        uint8_t *const answered = m->mask.data + at;
-        float *const rgb[3] = {weft_image_row(&m->albedo, 0, row), weft_image_row(&m->albedo, 1, row),
-                               weft_image_row(&m->albedo, 2, row)};
-        if (job->cal->has_colour)
-            weft_colour_model_apply_row(&job->cal->colour.model, rgb, m->width);
-        for (int i = 0; i < m->width; i++) {
-            if (job->inside->data && !job->inside->data[at + (size_t)i])
-                answered[i] = 0;
-            if (answered[i]) {
-                weft_image_row(&m->uncertainty, 0, row)[i] *= degrees;
-                continue;
-            }
-            for (int c = 0; c < 3; c++)
-                weft_image_row(&m->normal, c, row)[i] = rgb[c][i] = 0;
-            weft_image_row(&m->residual, 0, row)[i] = weft_image_row(&m->confidence, 0, row)[i] = 0;
-            weft_image_row(&m->uncertainty, 0, row)[i] = 0;
-            m->lights.data[at + (size_t)i] = 0;
-        }
+    const size_t at = (size_t)row * (size_t)m->width + (size_t)first;
+    uint8_t *const answered = m->mask.data + at;
+    float *const rgb[3] = {weft_image_plane(&m->albedo, 0) + at, weft_image_plane(&m->albedo, 1) + at,
+                           weft_image_plane(&m->albedo, 2) + at};
+    if (job->cal->has_colour)
+        weft_colour_model_apply_row(&job->cal->colour.model, rgb, n);
+    for (int i = 0; job->inside->data && i < n; i++)
+        answered[i] &= job->inside->data[at + (size_t)i] ? 255 : 0;
+    for (int i = 0; i < n; i++)
+        m->uncertainty.data[at + (size_t)i] *= degrees;
+    const uint8_t *hole = memchr(answered, 0, (size_t)n);
+    for (; hole; hole = memchr(hole + 1, 0, (size_t)(answered + n - hole - 1))) {
+        const size_t i = (size_t)(hole - answered);
+        for (int c = 0; c < 3; c++)
+            weft_image_plane(&m->normal, c)[at + i] = rgb[c][i] = 0;
+        m->residual.data[at + i] = m->confidence.data[at + i] = m->uncertainty.data[at + i] = 0;
+        m->lights.data[at + i] = 0;
     }
+}
+
+static void finish_rows(void *context, int band, int row_begin, int row_end)
+{
+    const solve_job *const job = context;
+    (void)band;
+    for (int row = row_begin; row < row_end; row++)
+        finish_part(context, row, 0, job->maps->width);
 }
 
 /* Light from yarn to yarn needs to know how large a pixel is: distant lights come without a camera. */
@@ -174,8 +178,9 @@ static weft_err solve_all_rows(solve_job *job, const weft_solve_options *options
     weft_light_plates_fini(job->plates); /* most of the memory; what follows needs some */
     WEFT_TRY(take_off_bounce(job, options, pixel, run, err));
     if (job->plan->cfa != WEFT_CFA_NONE)
-        WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, err));
-    weft_parallel_rows(height, finish_rows, job);
+        WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, finish_part, job, err));
+    else
+        weft_parallel_rows(height, finish_rows, job);
     job->maps->albedo_is_srgb = job->cal->has_colour;
     return WEFT_OK;
 }

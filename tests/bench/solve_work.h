@@ -13,7 +13,8 @@ typedef struct work {
     weft_incidence incidence;
     float *in[WEFT_LIGHTS_MAX]; /* [height][width] linear values of a mosaic */
     uint8_t *clipped[WEFT_LIGHTS_MAX];
-    float *out[WORK_OUTPUTS]; /* normal, albedo, residual, confidence, angle */
+    float *out[WORK_OUTPUTS]; /* normal, albedo, residual, confidence, angle; one behind the other */
+    float *sites;             /* the albedo's mosaic while it is made three planes */
     uint8_t *bytes[3];
 } work;
 
@@ -28,11 +29,12 @@ double work_now_s(void);
 /** Nanoseconds per pixel of one run over all rows.  `search_all` sends every pixel to the method's search. */
 double work_solve_ns(work *w, const weft_solve_method *method, const weft_gloss *gloss, bool search_all);
 
-/** Of reading the same input planes once (summed, so that nothing can be left out) and writing the outputs.
- */
+/** Of reading the same input planes once (summed, so that nothing can be left out) and writing the outputs
+ * once: 5 n + 39 bytes a pixel, a float and a byte per light, then normal, albedo, residual, confidence and
+ * uncertainty as floats, and lights, quality and mask as bytes. */
 double work_move_ns(work *w);
 
-/** Of making three planes of the albedo's one. */
+/** Of making three planes of the albedo's one, which is overwritten. */
 double work_demosaic_ns(work *w);
 
 /** *least becomes the smaller of both; NaN counts as nothing. */
