@@ -51,64 +51,25 @@ weft_err weft_preview_set_map(weft_preview_surface *surface, const char *name, c
     return WEFT_OK;
 }
 
-/* The frame of the shading normal, whose tangent stays in the plane of the map's X, and the view in it. */
-WEFT_CLONES
-static void set_frame(weft_preview_samples *s)
-{
-    WEFT_INDEPENDENT
-    for (int i = 0; i < s->n; i++) {
-        const double x = s->normal[0][i], y = s->normal[1][i], z = s->normal[2][i];
-        double n[3], t[3], local[3] = {0};
-        for (int c = 0; c < 3; c++)
-            n[c] = x * s->axis[0][c][i] + y * s->axis[1][c][i] + z * s->axis[2][c][i];
-        /* tangent less its part along n; x is that part, for the axes are orthonormal */
-        const double inverse = 1 / sqrt(weft_max(1 - x * x, 1e-12));
-        for (int c = 0; c < 3; c++)
-            t[c] = (s->axis[0][c][i] - x * n[c]) * inverse;
-        const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
-        for (int c = 0; c < 3; c++) {
-            const double v = s->eye[c][i];
-            local[0] += v * t[c];
-            local[1] += v * b[c];
-            local[2] += v * n[c];
-            s->frame[0][c][i] = t[c];
-            s->frame[1][c][i] = b[c];
-            s->frame[2][c][i] = n[c];
-        }
-        for (int c = 0; c < 3; c++)
-            s->view[c][i] = local[c];
-    }
-}
-
-WEFT_CLONES
-void weft_preview_turn_lamp(weft_preview_samples *s)
-{
-    for (int a = 0; a < 3; a++) {
-        WEFT_INDEPENDENT
-        for (int i = 0; i < s->n; i++)
-            s->light[a][i] = s->lamp[0][i] * s->frame[a][0][i] + s->lamp[1][i] * s->frame[a][1][i] +
-                             s->lamp[2][i] * s->frame[a][2][i];
-    }
-}
-
 void weft_preview_eval(const weft_preview_setup *setup, weft_preview_samples *s,
-                       double value[3][WEFT_PREVIEW_RUN])
+                       float value[3][WEFT_PREVIEW_RUN])
 {
-    weft_brdf_batch batch = {.n = s->n,
-                             .light = {s->light[0], s->light[1], s->light[2]},
-                             .view = {s->view[0], s->view[1], s->view[2]},
-                             .data = setup->surface->brdf->data};
-    double *const to[3] = {value[0], value[1], value[2]};
+    weft_brdf_batch_f32 batch = {.n = s->n,
+                                 .light = {s->light[0], s->light[1], s->light[2]},
+                                 .view = {s->view[0], s->view[1], s->view[2]},
+                                 .data = setup->surface->brdf->data};
+    float *const to[3] = {value[0], value[1], value[2]};
     for (int k = 0; k < weft_brdf_n_planes(setup->surface->brdf); k++)
         batch.param[k] = s->param[k];
-    setup->surface->brdf->eval(&batch, to);
+    setup->surface->brdf->eval_f32(&batch, to);
 }
 
 static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_view *const view = setup->view;
-    const double exposure = exp2(view->exposure_ev);
-    set_frame(s);
+    const float exposure = (float)exp2(view->exposure_ev), background = (float)view->background;
+    const float ambient = (float)view->ambient;
+    weft_preview_set_frame(s);
     for (int c = 0; c < 3; c++)
         memset(s->radiance[c], 0, sizeof s->radiance[c]);
     for (int k = 0; k < view->n_lights; k++)
@@ -116,10 +77,10 @@ static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
     if (view->surroundings.map)
         weft_preview_add_surroundings(setup, s);
     for (int c = 0; c < 3; c++) {
-        const double *const albedo = setup->albedo_plane >= 0 ? s->param[setup->albedo_plane + c] : NULL;
+        const float *const albedo = setup->albedo_plane >= 0 ? s->param[setup->albedo_plane + c] : NULL;
         for (int i = 0; i < s->n; i++) {
-            const double lit = s->radiance[c][i] + (albedo ? view->ambient * albedo[i] : 0);
-            s->value[c][i] = s->hit[i] > 0 ? exposure * lit : view->background;
+            const float lit = s->radiance[c][i] + (albedo ? ambient * albedo[i] : 0);
+            s->value[c][i] = s->hit[i] > 0 ? exposure * lit : background;
         }
     }
 }
@@ -149,7 +110,7 @@ static void splat_run(const render *r, const weft_preview_samples *s, int first,
     if (ss == 1) {
         for (int c = 0; c < 3 && target->row[0] >= 0; c++)
             for (int i = 0; i < s->n; i++)
-                weft_image_row(r->picture, c, target->row[0])[first + i] = (float)s->value[c][i];
+                weft_image_row(r->picture, c, target->row[0])[first + i] = s->value[c][i];
         return;
     }
     const int begin = first + ss / 2; /* samples from the left neighbour on */
@@ -159,8 +120,8 @@ static void splat_run(const render *r, const weft_preview_samples *s, int first,
         int pixel = 0, k = begin % ss;
         for (int i = 0; i < s->n; i++) {
             const double right = (k + 0.5) / ss;
-            sums[pixel] += (1 - right) * s->value[c][i];
-            sums[pixel + 1] += right * s->value[c][i];
+            sums[pixel] += (1 - right) * (double)s->value[c][i];
+            sums[pixel + 1] += right * (double)s->value[c][i];
             k = k + 1 < ss ? k + 1 : 0;
             pixel += k == 0;
         }
@@ -183,8 +144,8 @@ static void shade_run(const weft_preview_setup *setup, weft_preview_samples *s, 
     const int ss = setup->supersampling, width = setup->view->width;
     s->n = n;
     for (int i = 0; i < n; i++) {
-        s->x[i] = inside((first + i + 0.5) / ss - width / 2.0, width);
-        s->y[i] = inside(y, setup->view->height);
+        s->x[i] = (float)inside((first + i + 0.5) / ss - width / 2.0, width);
+        s->y[i] = (float)inside(y, setup->view->height);
     }
     weft_preview_hit(setup, s);
     weft_preview_fetch(setup, s);
@@ -301,8 +262,14 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
     if (view->draft)
         setup.supersampling = 1;
     WEFT_TRY(weft_image_init(&made, view->width, view->height, 3, err));
-    const weft_err status =
-        weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
+    weft_err status = WEFT_OK;
+    if (view->surroundings.map)
+        status = weft_environment_planes_init(&setup.around, view->surroundings.map, view->surroundings.table,
+                                              err);
+    if (status == WEFT_OK)
+        status =
+            weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
+    weft_environment_planes_fini(&setup.around);
     if (status != WEFT_OK)
         weft_image_fini(&made);
     else

@@ -1,7 +1,8 @@
+#define WEFT_SINGLE /* shading/brdf/real.h */
+
 #include "shading/preview/preview_samples.h"
 
-#include "core/clones.h"
-#include "shading/brdf/half_vector.h"
+#include "shading/brdf/real.h"
 
 /* Folds a coordinate into 0..size-1 by mirroring at the edges of the texels (-0.5 and size - 0.5). */
 static inline double mirror(double t, double size, double *sign)
@@ -24,7 +25,7 @@ static void place_taps(const weft_preview_setup *setup, weft_preview_samples *s)
         const double x = crop.x + mirror(s->u[i], crop.width, &sign_x);
         const double y = crop.y + mirror(s->v[i], crop.height, &sign_y);
         const int x0 = (int)x, y0 = (int)y, x1 = x0 < right ? x0 + 1 : x0, y1 = y0 < bottom ? y0 + 1 : y0;
-        const double fx = x - x0, fy = y - y0;
+        const float fx = (float)(x - x0), fy = (float)(y - y0);
         s->at[0][i] = y0 * stride + x0;
         s->at[1][i] = y0 * stride + x1;
         s->at[2][i] = y1 * stride + x0;
@@ -33,8 +34,8 @@ static void place_taps(const weft_preview_setup *setup, weft_preview_samples *s)
         s->share[1][i] = fx * (1 - fy);
         s->share[2][i] = (1 - fx) * fy;
         s->share[3][i] = fx * fy;
-        s->sign[0][i] = sign_x;
-        s->sign[1][i] = sign_y;
+        s->sign[0][i] = (float)sign_x;
+        s->sign[1][i] = (float)sign_y;
     }
 }
 
@@ -42,27 +43,27 @@ static void place_taps(const weft_preview_setup *setup, weft_preview_samples *s)
 static void apply_mask(const weft_mask *mask, weft_preview_samples *s)
 {
     for (int i = 0; i < s->n; i++) {
-        double sum = 0;
+        float sum = 0;
         for (int k = 0; k < 4; k++) {
             s->share[k][i] = mask->data[s->at[k][i]] ? s->share[k][i] : 0;
             sum += s->share[k][i];
         }
         for (int k = 0; k < 4 && sum > 0; k++)
             s->share[k][i] /= sum;
-        if (sum < 0.5)
+        if (sum < 0.5F)
             s->hit[i] = 0;
     }
 }
 
 WEFT_CLONES
-static void fetch(const weft_image *image, int plane, const weft_preview_samples *s, double *to)
+static void fetch(const weft_image *image, int plane, const weft_preview_samples *s, float *to)
 {
     const float *const from = weft_image_plane(image, plane);
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
-        double sum = 0;
+        float sum = 0;
         for (int k = 0; k < 4; k++) {
-            const double texel = (double)from[s->at[k][i]];
+            const float texel = from[s->at[k][i]];
             sum += s->share[k][i] > 0 ? s->share[k][i] * texel : 0; /* a masked texel may be NaN */
         }
         to[i] = sum;
@@ -76,10 +77,10 @@ static void fetch_normals(const weft_image *normal, weft_preview_samples *s)
         fetch(normal, c, s, s->normal[c]);
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
-        const double x = s->sign[0][i] * s->normal[0][i], y = s->sign[1][i] * s->normal[1][i];
-        const double z = s->normal[2][i], length2 = x * x + y * y + z * z;
-        const double known = length2 > 1e-12 ? 1 : 0; /* NaN fails the test too */
-        const double inverse = 1 / sqrt(known > 0 ? length2 : 1);
+        const float x = s->sign[0][i] * s->normal[0][i], y = s->sign[1][i] * s->normal[1][i];
+        const float z = s->normal[2][i], length2 = x * x + y * y + z * z;
+        const float known = length2 > 1e-12F ? 1 : 0; /* NaN fails the test too */
+        const float inverse = 1 / sqrtf(known > 0 ? length2 : 1);
         s->normal[0][i] = known > 0 ? x * inverse : 0;
         s->normal[1][i] = known > 0 ? y * inverse : 0;
         s->normal[2][i] = known > 0 ? z * inverse : 1;
@@ -94,11 +95,11 @@ static void flat_normals(weft_preview_samples *s)
 }
 
 WEFT_CLONES
-static void clamp(double *values, int n, double low, double high)
+static void clamp(float *values, int n, float low, float high)
 {
     WEFT_INDEPENDENT
     for (int i = 0; i < n; i++) { /* NaN fails both tests and becomes the lower end */
-        const double above = values[i] > low ? values[i] : low;
+        const float above = values[i] > low ? values[i] : low;
         values[i] = above < high ? above : high;
     }
 }
@@ -118,7 +119,7 @@ void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s
         if (map.image)
             fetch(map.image, map.plane, s, s->param[k]);
         for (int i = 0; i < s->n && !map.image; i++)
-            s->param[k][i] = surface->params[k];
-        clamp(s->param[k], s->n, setup->low[k], setup->high[k]);
+            s->param[k][i] = (float)surface->params[k];
+        clamp(s->param[k], s->n, (float)setup->low[k], (float)setup->high[k]);
     }
 }

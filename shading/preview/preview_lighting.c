@@ -1,9 +1,6 @@
 #include "shading/preview/preview_samples.h"
 
 #include "shading/brdf/half_vector.h"
-#include "shading/lighting/area_light.h"
-
-#include <string.h>
 
 static double dot(const double a[3], const double b[3])
 {
@@ -30,11 +27,11 @@ static void aim_at(weft_preview_samples *s, int i, const double point_mm[3], dou
 {
     double d[3];
     for (int c = 0; c < 3; c++)
-        d[c] = point_mm[c] - s->position_mm[c][i];
+        d[c] = point_mm[c] - (double)s->position_mm[c][i];
     const double r2 = distance2(d), inverse = 1 / sqrt(r2);
     for (int c = 0; c < 3; c++)
-        s->lamp[c][i] = d[c] * inverse;
-    s->irradiance[i] = weight * origin2 / r2;
+        s->lamp[c][i] = (float)(d[c] * inverse);
+    s->irradiance[i] = (float)(weight * origin2 / r2);
 }
 
 /* Point k of a ball as seen from the sample: the cone that holds it, cut into equal solid angles by a
@@ -43,7 +40,7 @@ static void aim_at_ball(const weft_preview_light *light, weft_preview_samples *s
 {
     double d[3], t[3];
     for (int c = 0; c < 3; c++)
-        d[c] = light->position_mm[c] - s->position_mm[c][i];
+        d[c] = light->position_mm[c] - (double)s->position_mm[c][i];
     const double r2 = distance2(d), inverse = 1 / sqrt(r2);
     const double sine2 = fmin(light->radius_mm * light->radius_mm / r2, 0.9999), reach = 1 - sqrt(1 - sine2);
     for (int c = 0; c < 3; c++)
@@ -58,9 +55,9 @@ static void aim_at_ball(const weft_preview_light *light, weft_preview_samples *s
         t[c] *= unit;
     const double b[3] = {d[1] * t[2] - d[2] * t[1], d[2] * t[0] - d[0] * t[2], d[0] * t[1] - d[1] * t[0]};
     for (int c = 0; c < 3; c++)
-        s->lamp[c][i] = z * d[c] + r * (cos(phi) * t[c] + sin(phi) * b[c]);
-    s->irradiance[i] =
-        2 * reach / sine2 * at_origin2(light) / r2 / WEFT_PREVIEW_AREA_POINTS; /* 2 pi reach / (pi sine2) */
+        s->lamp[c][i] = (float)(z * d[c] + r * (cos(phi) * t[c] + sin(phi) * b[c]));
+    /* 2 pi reach / (pi sine2) */
+    s->irradiance[i] = (float)(2 * reach / sine2 * at_origin2(light) / r2 / WEFT_PREVIEW_AREA_POINTS);
 }
 
 static void aim(const weft_preview_light *light, weft_preview_samples *s, int k)
@@ -73,7 +70,7 @@ static void aim(const weft_preview_light *light, weft_preview_samples *s, int k)
         switch (light->kind) {
         case WEFT_PREVIEW_DISTANT:
             for (int c = 0; c < 3; c++)
-                s->lamp[c][i] = light->direction[c];
+                s->lamp[c][i] = (float)light->direction[c];
             s->irradiance[i] = 1;
             break;
         case WEFT_PREVIEW_POINT:
@@ -95,21 +92,28 @@ static void aim(const weft_preview_light *light, weft_preview_samples *s, int k)
  * show as a line across the bumps; the soft one is Chiang et al. 2019 ("Taming the shadow terminator"):
  * S = -G^3 + G^2 + G with G = min(1, (g.l)/((n.l)(g.n))), g the normal of the shape.
  */
-static double shape_shadow(const weft_preview_setup *setup, const weft_preview_samples *s, int i)
+static float shape_shadow(const weft_preview_setup *setup, const weft_preview_samples *s, int i)
 {
-    const double gl = s->lamp[0][i] * s->axis[2][0][i] + s->lamp[1][i] * s->axis[2][1][i] +
-                      s->lamp[2][i] * s->axis[2][2][i];
-    const double nl = s->light[2][i], gn = s->normal[2][i];
+    const float gl = s->lamp[0][i] * s->axis[2][0][i] + s->lamp[1][i] * s->axis[2][1][i] +
+                     s->lamp[2][i] * s->axis[2][2][i];
+    const float nl = s->light[2][i], gn = s->normal[2][i];
     if (gl <= 0 || nl <= 0)
         return 0;
     if (setup->view->shape == WEFT_PREVIEW_PLANE)
         return 1;
-    const double product = nl * weft_max(gn, 1e-3), g = gl < product ? gl / product : 1;
-    const double soft = g * (1 + g * (1 - g));
+    const float product = nl * (gn > 1e-3F ? gn : 1e-3F), g = gl < product ? gl / product : 1;
+    const float soft = g * (1 + g * (1 - g));
     if (setup->view->shape != WEFT_PREVIEW_DRAPE)
         return soft;
-    const double at[3] = {s->x[i], s->y[i], 0}, lamp[3] = {s->lamp[0][i], s->lamp[1][i], s->lamp[2][i]};
-    return soft * weft_preview_drape_light(setup, at, lamp);
+    const double at[3] = {(double)s->x[i], (double)s->y[i], 0};
+    const double lamp[3] = {(double)s->lamp[0][i], (double)s->lamp[1][i], (double)s->lamp[2][i]};
+    return soft * (float)weft_preview_drape_light(setup, at, lamp);
+}
+
+void weft_preview_shadow(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    for (int i = 0; i < s->n; i++)
+        s->irradiance[i] *= shape_shadow(setup, s, i);
 }
 
 /* Adds f E for the lamp directions that are set. */
@@ -118,74 +122,13 @@ static void add_lamp(const weft_preview_setup *setup, const weft_preview_light *
 {
     weft_preview_turn_lamp(s);
     weft_preview_eval(setup, s, s->value);
-    for (int i = 0; i < s->n; i++)
-        s->irradiance[i] *= weft_max(s->light[2][i], 0) * shape_shadow(setup, s, i);
-    for (int c = 0; c < 3; c++)
+    weft_preview_shadow(setup, s);
+    for (int c = 0; c < 3; c++) {
+        const float power = (float)light->irradiance[c];
         for (int i = 0; i < s->n; i++)
-            s->radiance[c][i] += s->value[c][i] * s->irradiance[i] * light->irradiance[c];
-}
-
-/* The light's representative point for the mirrored eye. */
-static void aim_at_highlight(const weft_preview_setup *setup, const weft_preview_light *light,
-                             weft_preview_samples *s)
-{
-    for (int i = 0; i < s->n; i++) {
-        double to_start[3], to_end[3], r[3];
-        const double alpha = s->param[setup->alpha_plane][i], nv = s->view[2][i];
-        for (int c = 0; c < 3; c++) {
-            to_start[c] = light->position_mm[c] - s->position_mm[c][i];
-            to_end[c] = light->end_mm[c] - s->position_mm[c][i];
-            r[c] = 2 * nv * s->frame[2][c][i] - s->eye[c][i];
-        }
-        const weft_light_point point = light->kind == WEFT_PREVIEW_BALL
-                                           ? weft_light_sphere(to_start, r, light->radius_mm, alpha)
-                                           : weft_light_tube_of(to_start, to_end, r, alpha).point;
-        for (int c = 0; c < 3; c++)
-            s->lamp[c][i] = point.l[c];
-        s->norm[i] = point.norm;
+            s->radiance[c][i] +=
+                s->value[c][i] * s->irradiance[i] * (s->light[2][i] > 0 ? s->light[2][i] : 0) * power;
     }
-}
-
-/* The middle of the light; its share of the irradiance. */
-static void aim_at_middle(const weft_preview_light *light, weft_preview_samples *s)
-{
-    double middle[3];
-    const bool tube = light->kind == WEFT_PREVIEW_TUBE;
-    for (int c = 0; c < 3; c++)
-        middle[c] = tube ? 0.5 * (light->position_mm[c] + light->end_mm[c]) : light->position_mm[c];
-    for (int i = 0; i < s->n; i++)
-        aim_at(s, i, middle, at_origin2(light), 1);
-}
-
-/* Matte part from the middle, mirrored part from the representative point: f without albedo is the latter. */
-static void add_representative(const weft_preview_setup *setup, const weft_preview_light *light,
-                               weft_preview_samples *s)
-{
-    double albedo[3][WEFT_PREVIEW_RUN];
-    const int plane = setup->albedo_plane;
-    aim_at_middle(light, s);
-    weft_preview_turn_lamp(s);
-    weft_preview_eval(setup, s, s->matte);
-    for (int c = 0; c < 3 && plane >= 0; c++) {
-        memcpy(albedo[c], s->param[plane + c], sizeof albedo[c]);
-        memset(s->param[plane + c], 0, sizeof albedo[c]);
-    }
-    weft_preview_eval(setup, s, s->value);
-    for (int i = 0; i < s->n; i++)
-        s->irradiance[i] *= shape_shadow(setup, s, i);
-    for (int c = 0; c < 3; c++)
-        for (int i = 0; i < s->n; i++)
-            s->radiance[c][i] += weft_max(s->matte[c][i] - s->value[c][i], 0) * s->irradiance[i] *
-                                 weft_max(s->light[2][i], 0) * light->irradiance[c];
-    aim_at_highlight(setup, light, s);
-    weft_preview_turn_lamp(s);
-    weft_preview_eval(setup, s, s->value);
-    for (int c = 0; c < 3; c++)
-        for (int i = 0; i < s->n; i++)
-            s->radiance[c][i] += s->value[c][i] * s->norm[i] * s->irradiance[i] *
-                                 weft_max(s->light[2][i], 0) * light->irradiance[c];
-    for (int c = 0; c < 3 && plane >= 0; c++)
-        memcpy(s->param[plane + c], albedo[c], sizeof albedo[c]);
 }
 
 void weft_preview_add_light(const weft_preview_setup *setup, const weft_preview_light *light,
@@ -193,7 +136,7 @@ void weft_preview_add_light(const weft_preview_setup *setup, const weft_preview_
 {
     const bool large = light->kind == WEFT_PREVIEW_BALL || light->kind == WEFT_PREVIEW_TUBE;
     if (large && light->area == WEFT_PREVIEW_REPRESENTATIVE && setup->alpha_plane >= 0) {
-        add_representative(setup, light, s);
+        weft_preview_add_representative(setup, light, s);
         return;
     }
     for (int k = 0; k < (large ? WEFT_PREVIEW_AREA_POINTS : 1); k++) {

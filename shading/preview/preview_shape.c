@@ -65,37 +65,48 @@ static void set_axes(weft_preview_samples *s, int i, double x, double y, double 
     const double axes[3][3] = {{1 - x * x * k, -x * y * k, -x}, {-x * y * k, 1 - y * y * k, -y}, {x, y, z}};
     for (int a = 0; a < 3; a++)
         for (int c = 0; c < 3; c++)
-            s->axis[a][c][i] = axes[a][c];
+            s->axis[a][c][i] = (float)axes[a][c];
 }
 
 static void set_eye(weft_preview_samples *s, int i, double x, double y, double z)
 {
     const double inverse = 1 / sqrt(x * x + y * y + z * z);
-    s->eye[0][i] = x * inverse;
-    s->eye[1][i] = y * inverse;
-    s->eye[2][i] = z * inverse;
+    s->eye[0][i] = (float)(x * inverse);
+    s->eye[1][i] = (float)(y * inverse);
+    s->eye[2][i] = (float)(z * inverse);
 }
 
 /* A camera that looks straight down on a plane sees it as an orthographic one does; only the directions to
  * the eye differ. */
+WEFT_CLONES
 static void hit_plane(const weft_preview_setup *setup, weft_preview_samples *s)
 {
-    const double scale = setup->texels_per_px, eye = setup->eye_distance;
-    const weft_preview_surface *const surface = setup->surface;
+    const double scale = setup->texels_per_px, mm_per_px = setup->surface->mm_per_px;
     const double half_width = setup->crop.width / 2.0, half_height = setup->crop.height / 2.0;
+    const double left = half_width - 0.5, top = half_height - 0.5; /* of the middle, map pixels */
+    const double x_mm = setup->surface->origin_mm[0] + (setup->crop.x + left) * mm_per_px;
+    const double y_mm = setup->surface->origin_mm[1] - (setup->crop.y + top) * mm_per_px;
+    const float near = setup->eye_distance > 0 ? 1 : 0, eye = near > 0 ? (float)setup->eye_distance : 1;
+    for (int a = 0; a < 3; a++)
+        for (int c = 0; c < 3; c++)
+            for (int i = 0; i < s->n; i++)
+                s->axis[a][c][i] = a == c;
+    WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
-        const double x = s->x[i] * scale, y = s->y[i] * scale;
-        s->hit[i] = fabs(x) <= half_width && fabs(y) <= half_height ? 1 : 0;
-        s->u[i] = half_width - 0.5 + x;
-        s->v[i] = half_height - 0.5 - y;
-        s->position_mm[0][i] = surface->origin_mm[0] + (setup->crop.x + s->u[i]) * surface->mm_per_px;
-        s->position_mm[1][i] = surface->origin_mm[1] - (setup->crop.y + s->v[i]) * surface->mm_per_px;
+        const double x = (double)s->x[i] * scale, y = (double)s->y[i] * scale;
+        s->u[i] = left + x;
+        s->v[i] = top - y;
+        s->hit[i] = (fabs(x) <= half_width ? 1.0F : 0) * (fabs(y) <= half_height ? 1.0F : 0);
+        s->position_mm[0][i] = (float)(x_mm + x * mm_per_px);
+        s->position_mm[1][i] = (float)(y_mm + y * mm_per_px);
         s->position_mm[2][i] = 0;
-        set_axes(s, i, 0, 0, 1);
-        if (eye > 0)
-            set_eye(s, i, -s->x[i], -s->y[i], eye);
-        else
-            set_eye(s, i, 0, 0, 1);
+    }
+    WEFT_INDEPENDENT
+    for (int i = 0; i < s->n; i++) {
+        const float x = -near * s->x[i], y = -near * s->y[i], inverse = 1 / sqrtf(x * x + y * y + eye * eye);
+        s->eye[0][i] = x * inverse;
+        s->eye[1][i] = y * inverse;
+        s->eye[2][i] = eye * inverse;
     }
 }
 
@@ -128,13 +139,13 @@ static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
     const double radius = setup->radius_texels, eye = setup->eye_distance;
     for (int i = 0; i < s->n; i++) {
         double n[3] = {0, 0, 1};
-        s->hit[i] = meet_sphere(setup, s->x[i], s->y[i], n) ? 1 : 0;
+        s->hit[i] = meet_sphere(setup, (double)s->x[i], (double)s->y[i], n) ? 1 : 0;
         const double sine = sqrt(n[0] * n[0] + n[1] * n[1]);
         const double arc = sine > 1e-9 ? radius * atan2(sine, n[2]) / sine : radius;
         s->u[i] = setup->crop.width / 2.0 - 0.5 + n[0] * arc;
         s->v[i] = setup->crop.height / 2.0 - 0.5 - n[1] * arc;
         for (int c = 0; c < 3; c++)
-            s->position_mm[c][i] = n[c] * radius * setup->surface->mm_per_px;
+            s->position_mm[c][i] = (float)(n[c] * radius * setup->surface->mm_per_px);
         set_axes(s, i, n[0], n[1], n[2]);
         if (eye > 0)
             set_eye(s, i, -n[0], -n[1], eye - n[2]);
@@ -147,7 +158,7 @@ static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const double radius = setup->radius_texels;
     for (int i = 0; i < s->n; i++) {
-        const double x = s->x[i] / setup->radius_px, y = s->y[i] / setup->radius_px;
+        const double x = (double)s->x[i] / setup->radius_px, y = (double)s->y[i] / setup->radius_px;
         const bool on = fabs(x) < 1 && fabs(y) <= SPHERE_SHARE / ROLL_SHARE;
         const double nx = on ? x : 0, nz = sqrt(1 - nx * nx);
         s->hit[i] = on;
@@ -155,9 +166,9 @@ static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
         s->v[i] = setup->crop.height / 2.0 - 0.5 - radius * y;
         const double axes[3][3] = {{nz, 0, -nx}, {0, 1, 0}, {nx, 0, nz}}, at[3] = {nx, y, nz};
         for (int a = 0; a < 3; a++) {
-            s->position_mm[a][i] = at[a] * radius * setup->surface->mm_per_px;
+            s->position_mm[a][i] = (float)(at[a] * radius * setup->surface->mm_per_px);
             for (int c = 0; c < 3; c++)
-                s->axis[a][c][i] = axes[a][c];
+                s->axis[a][c][i] = (float)axes[a][c];
         }
         set_eye(s, i, 0, 0, 1);
     }
@@ -194,9 +205,9 @@ static void set_drape_axes(weft_preview_samples *s, int i, const double slope[2]
     const double n[3] = {-slope[0] * up, -slope[1] * up, up};
     const double b[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
     for (int c = 0; c < 3; c++) {
-        s->axis[0][c][i] = t[c];
-        s->axis[1][c][i] = b[c];
-        s->axis[2][c][i] = n[c];
+        s->axis[0][c][i] = (float)t[c];
+        s->axis[1][c][i] = (float)b[c];
+        s->axis[2][c][i] = (float)n[c];
     }
 }
 
@@ -205,14 +216,14 @@ static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
     const double half = setup->radius_texels, scale = half * setup->surface->mm_per_px;
     for (int i = 0; i < s->n; i++) {
         double slope[2];
-        const double x = s->x[i] / setup->radius_px, y = s->y[i] / setup->radius_px;
+        const double x = (double)s->x[i] / setup->radius_px, y = (double)s->y[i] / setup->radius_px;
         const double z = drape_height(x, y, slope);
         s->hit[i] = fabs(x) <= 1 && fabs(y) <= 1;
         s->u[i] = setup->crop.width / 2.0 - 0.5 + half * drape_length(x, y);
         s->v[i] = setup->crop.height / 2.0 - 0.5 - half * y;
-        s->position_mm[0][i] = x * scale;
-        s->position_mm[1][i] = y * scale;
-        s->position_mm[2][i] = z * scale;
+        s->position_mm[0][i] = (float)(x * scale);
+        s->position_mm[1][i] = (float)(y * scale);
+        s->position_mm[2][i] = (float)(z * scale);
         set_drape_axes(s, i, slope);
         set_eye(s, i, 0, 0, 1);
     }

@@ -10,6 +10,7 @@
 #include "shading/lighting/area_light.h"
 #include "shading/lighting/environment.h"
 #include "shading/lighting/environment_map.h"
+#include "shading/lighting/environment_planes.h"
 #include "shading/lighting/environment_table.h"
 #include "shading/lighting/sky.h"
 #include "shading/lighting/volume_light.h"
@@ -294,6 +295,58 @@ static void test_painted_sky(void **state)
     weft_image_fini(&panorama);
 }
 
+/* Planes of directions in single precision against one at a time in double, poles and seam included. */
+static void check_planes(const weft_environment_table *table)
+{
+    enum { N = 3000 };
+    static float d[3][N], alpha[N], nv[N], e[3][N], look[3][N], scale[N], bias[N];
+    const float *const direction[3] = {d[0], d[1], d[2]};
+    float *const irradiance[3] = {e[0], e[1], e[2]}, *const radiance[3] = {look[0], look[1], look[2]};
+    uint64_t random = SEED;
+    weft_image sky;
+    weft_environment_map map;
+    static weft_environment_planes planes;
+    assert_ok(weft_environment_paint_sky(&sky, &weft_sky_cie_clear, 1.2, 2, err));
+    for (int y = 0; y < sky.height; y++)
+        weft_image_row(&sky, 2, y)[0] *= 30; /* a bright column at the seam */
+    assert_ok(weft_environment_map_init(&map, &sky, err));
+    assert_ok(weft_environment_planes_init(&planes, &map, table, err));
+    for (int i = 0; i < N; i++) {
+        double l[3];
+        weft_brdf_direction(i % 7   ? between(&random, -1, 1)
+                            : i % 2 ? 1
+                                    : -1,
+                            i % 3 ? between(&random, 0, 7) : 1.5 * WEFT_PI + 1e-3 * (i % 11 - 5), l);
+        for (int c = 0; c < 3; c++)
+            d[c][i] = (float)l[c];
+        alpha[i] = (float)(i % 5 ? pow(weft_test_random(&random), 2) : i % 2);
+        nv[i] = (float)(i % 5 ? between(&random, 1e-3, 1) : 1);
+    }
+    weft_environment_planes_irradiance(&planes, N, direction, irradiance);
+    weft_environment_planes_look(&planes, N, direction, alpha, radiance);
+    weft_environment_planes_share(&planes, N, nv, alpha, scale, bias);
+    double worst = 0;
+    for (int i = 0; i < N; i++) {
+        const double at[3] = {(double)d[0][i], (double)d[1][i], (double)d[2][i]};
+        double want_e[3], want[3];
+        weft_environment_map_irradiance(&map, at, want_e);
+        weft_environment_map_look(&map, at, sqrt((double)alpha[i]), want);
+        const weft_environment_share share =
+            weft_environment_table_at(table, (double)nv[i], (double)alpha[i]);
+        for (int c = 0; c < 3; c++) {
+            assert_near(e[c][i], want_e[c], 1e-5);
+            assert_near(look[c][i], want[c], 2e-3 * (1 + want[c]));
+        }
+        worst = fmax(worst, fabs((double)scale[i] - share.scale));
+        worst = fmax(worst, fabs((double)bias[i] - share.bias));
+    }
+    print_message("  shares in planes: largest difference from the table %.1e\n", worst);
+    assert_near(worst, 0, 1.5e-3);
+    weft_environment_planes_fini(&planes);
+    weft_environment_map_fini(&map);
+    weft_image_fini(&sky);
+}
+
 static void test_environment_table(void **state)
 {
     (void)state;
@@ -314,6 +367,7 @@ static void test_environment_table(void **state)
     static weft_environment_table again;
     weft_environment_table_get(&again, WEFT_ENVIRONMENT_SMITH); /* from the cache */
     assert_memory_equal(&again, &table, sizeof table);
+    check_planes(&table);
     assert_ok(weft_folder_remove(folder, err));
 }
 
