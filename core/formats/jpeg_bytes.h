@@ -1,8 +1,8 @@
-/** JPEG in memory, for looking at: libjpeg-turbo. */
+/** JPEG in memory: libjpeg-turbo. */
 #ifndef WEFT_CORE_FORMATS_JPEG_BYTES_H
 #define WEFT_CORE_FORMATS_JPEG_BYTES_H
 
-#include "core/error.h"
+#include "core/formats/raster.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -17,5 +17,9 @@
 weft_err weft_jpeg_encode(const uint8_t *rgb, int width, int height, int quality, unsigned char **bytes,
                           size_t *n, weft_error *err);
 void weft_jpeg_free(unsigned char *bytes);
+
+/** Decodes a JPEG as RGB of 8 bits.
+ *  @return WEFT_ERR_FORMAT when it is damaged or claims more pixels than its bytes can hold */
+weft_err weft_jpeg_decode(const unsigned char *bytes, size_t n, weft_raster *raster, weft_error *err);
 
 #endif

@@ -8,6 +8,7 @@
 #include "core/progress.h"
 #include "core/shipped.h"
 #include "shading/material/build.h"
+#include "shading/u3m/u3m_keep.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -236,17 +237,44 @@ static weft_err work(const weft_invocation *inv, const bake_args *args, weft_ass
     return bake(inv, args, assets, asset, err);
 }
 
+/* A U3M is a material as it stands: the text that one would write for it. */
+static weft_err load_u3m(const char *path, weft_assets **assets, weft_error *err)
+{
+    weft_u3m *u3m;
+    char name[200];
+    WEFT_TRY(weft_u3m_open(path, &u3m, err));
+    weft_u3m_identifier(u3m->name, name, sizeof name);
+    char *const text = strchr(path, '"') ? NULL
+                                         : weft_asprintf(err, ":%s := ( %s :u3m = \"%s\" )\n", name,
+                                                         weft_u3m_type(u3m), weft_path_name(path));
+    weft_u3m_close(u3m);
+    if (!text)
+        return weft_fail(err, WEFT_ERR_FORMAT, "%s: has a quotation mark in its name; rename it", path);
+    const weft_err status = weft_assets_load_text(path, text, assets, err);
+    weft_free(text);
+    return status;
+}
+
+static bool is_u3m(const char *path)
+{
+    return weft_path_has_suffix(path, ".u3m") || weft_path_has_suffix(path, ".u3ma");
+}
+
 static weft_err run(const weft_invocation *inv, const void *void_args, weft_error *err)
 {
     const bake_args *const args = void_args;
     weft_assets *assets = NULL;
     char *shipped = NULL;
+    if (args->format && is_u3m(inv->operands[0]))
+        return weft_fail(err, WEFT_ERR_USAGE, "--format is for texts (.radattr)");
     if (args->format)
         return rewrite(inv, inv->operands[0], err);
     if (!args->library)
         (void)weft_shipped_path("library", &shipped, NULL); /* only needed where a text includes from it */
     weft_err status =
-        weft_assets_load(inv->operands[0], args->library ? args->library : shipped, &assets, err);
+        is_u3m(inv->operands[0])
+            ? load_u3m(inv->operands[0], &assets, err)
+            : weft_assets_load(inv->operands[0], args->library ? args->library : shipped, &assets, err);
     if (assets && (status != WEFT_OK || weft_log_get_level() > WEFT_LOG_QUIET))
         weft_diagnostics_print(weft_assets_diagnostics(assets), stderr);
     if (status == WEFT_OK)
@@ -259,13 +287,15 @@ static weft_err run(const weft_invocation *inv, const void *void_args, weft_erro
 const weft_command weft_cmd_bake = {
     .name = "bake",
     .summary = "make a material's maps with mips, and exports; only what changed",
-    .operands = "MATERIAL.radattr",
+    .operands = "MATERIAL.radattr|SWATCH.u3ma",
     .min_operands = 1,
     .max_operands = 1,
     .args_size = sizeof(bake_args),
     .fields = fields,
-    .details = "The text says what the material derives from and what it changes; docs/materials.md is the "
-               "language.  Run it again after any change: it rebuilds what depends on it, and --why tells.",
+    .details =
+        "The text says what the material derives from and what it changes; docs/materials.md is the "
+        "language.  A U3M (.u3m, .u3ma) is a material too; exported as u3m again it keeps all that Weft does "
+        "not know.  Run it again after any change: it rebuilds what depends on it, and --why tells.",
     .example = "weft bake shirting.radattr -o shirting.material --export all --why",
     .run = run,
 };

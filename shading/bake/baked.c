@@ -54,6 +54,7 @@ void weft_baked_fini(weft_baked *baked)
         for (int level = 0; level < WEFT_BAKED_MAX_MIPS; level++)
             weft_image_fini(&baked->maps[k].mips[level]);
     weft_free(baked->name);
+    weft_free(baked->u3m);
     json_decref(baked->provenance);
     *baked = (weft_baked){0};
 }

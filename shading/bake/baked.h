@@ -65,6 +65,7 @@ typedef struct weft_baked {
     bool periodic;                  /* the right edge continues at the left, the top at the bottom */
     bool enable_diffuse, enable_specular;
     weft_baked_map maps[WEFT_BAKED_COUNT];
+    char *u3m;                      /* path of the U3M that it is made from; NULL: from none */
     json_t *provenance; /* inputs with hashes, options, version: goes into reports; may be NULL */
 } weft_baked;
 

@@ -7,6 +7,7 @@
 #include "shading/material/asset_check.h"
 #include "shading/material/asset_merge.h"
 
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -349,7 +350,23 @@ static void resolve_all(weft_assets *a)
         }
 }
 
-weft_err weft_assets_load(const char *path, const char *library, weft_assets **assets, weft_error *err)
+static weft_err take_text(weft_assets *a, const char *path, const char *text, weft_error *err)
+{
+    file_entry *const file = weft_arena_alloc(&a->arena, sizeof *file, err);
+    if (!file || !(file->source.path = weft_arena_text(&a->arena, path, strlen(path), err)) ||
+        !(file->source.text = weft_arena_text(&a->arena, text, strlen(text), err)))
+        return WEFT_ERR_NOMEM;
+    file->source.n = strlen(text);
+    file->id = (char *)(uintptr_t)file->source.path;
+    a->files = a->last_file = file;
+    a->n_files = 1;
+    file->tree = weft_rad_parse(&file->source, &a->arena, &a->diagnostics);
+    return WEFT_OK;
+}
+
+/* @param text  NULL: the file's */
+static weft_err load(const char *path, const char *text, const char *library, weft_assets **assets,
+                     weft_error *err)
 {
     *assets = NULL;
     weft_assets *const a = weft_alloc(1, sizeof *a, err);
@@ -357,7 +374,7 @@ weft_err weft_assets_load(const char *path, const char *library, weft_assets **a
         return WEFT_ERR_NOMEM;
     a->diagnostics.arena = &a->arena;
     a->library = library;
-    weft_err status = read_files(a, path, err);
+    weft_err status = text ? take_text(a, path, text, err) : read_files(a, path, err);
     if (status == WEFT_OK)
         status = index_names(a, err);
     if (status != WEFT_OK) {
@@ -367,6 +384,16 @@ weft_err weft_assets_load(const char *path, const char *library, weft_assets **a
     resolve_all(a);
     *assets = a;
     return weft_diagnostics_status(&a->diagnostics, err);
+}
+
+weft_err weft_assets_load(const char *path, const char *library, weft_assets **assets, weft_error *err)
+{
+    return load(path, NULL, library, assets, err);
+}
+
+weft_err weft_assets_load_text(const char *path, const char *text, weft_assets **assets, weft_error *err)
+{
+    return load(path, text, NULL, assets, err);
 }
 
 /* -- asking ------------------------------------------------------------------------------------------- */

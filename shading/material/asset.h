@@ -31,6 +31,8 @@ typedef struct weft_assets weft_assets;
  *         whenever there are diagnostics to print, also then: destroy it.
  */
 weft_err weft_assets_load(const char *path, const char *library, weft_assets **assets, weft_error *err);
+/** The same for a text in memory, as if it stood beside `path`.  @param text  ends with NUL; copied */
+weft_err weft_assets_load_text(const char *path, const char *text, weft_assets **assets, weft_error *err);
 void weft_assets_destroy(weft_assets *assets);
 
 const weft_diagnostics *weft_assets_diagnostics(const weft_assets *assets);

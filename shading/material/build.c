@@ -531,6 +531,11 @@ static void key_export(const builder *b, const weft_exporter *exporter, char hex
         for (int p = 0; p < weft_baked_rows[k].planes; p++)
             weft_build_key_number(&key, "constant", (double)b->baked.maps[k].constant[p]);
     }
+    const char *path;
+    json_t *input;
+    if (weft_rad_at(&b->asset->properties, "u3m")) /* what of it no map holds is exported too */
+        json_object_foreach(b->inputs, path, input)
+            weft_build_key_text(&key, path, json_string_value(json_object_get(input, "sha256")));
     weft_build_key_text(&key, "name", b->baked.name);
     weft_build_key_text(&key, "type", b->baked.type->name);
     weft_build_key_number(&key, "width_mm", b->baked.size_mm[0]);
@@ -594,8 +599,11 @@ static weft_err make_exports(builder *b, weft_error *err)
         *(current ? &b->result->kept : &b->result->rebuilt) += 1;
         if (current)
             continue;
-        if (!whole.type)
+        if (!whole.type) {
             status = weft_material_load(b->options->folder, &whole, err);
+            if (status == WEFT_OK)
+                status = weft_composite_u3m(b->asset, &whole.u3m, err);
+        }
         if (status == WEFT_OK)
             status = export_one(b, *e, &whole, err);
         if (status == WEFT_OK)

@@ -5,6 +5,7 @@
 #include "shading/material/blend.h"
 #include "shading/material/mask.h"
 #include "shading/material/texture.h"
+#include "shading/u3m/u3m_document.h"
 
 #include <math.h>
 #include <string.h>
@@ -57,10 +58,12 @@ static const weft_rad_member *own(const weft_rad_record *record, const char *nam
     return m;
 }
 
-static weft_err scan_path(const weft_rad_member *scan, char **path, weft_error *err)
+/* Of a scan or a U3M: beside the text that names it. */
+static weft_err source_path(const weft_rad_member *source, char **path, weft_error *err)
 {
-    char *const folder = weft_path_folder(scan->value->place.source->path, err);
-    *path = folder ? weft_path_join(strcmp(folder, ".") == 0 ? NULL : folder, scan->value->text, err) : NULL;
+    char *const folder = weft_path_folder(source->value->place.source->path, err);
+    *path =
+        folder ? weft_path_join(strcmp(folder, ".") == 0 ? NULL : folder, source->value->text, err) : NULL;
     weft_free(folder);
     return *path ? WEFT_OK : WEFT_ERR_NOMEM;
 }
@@ -72,12 +75,22 @@ static weft_err load_scan(const compositor *c, const weft_rad_member *member, we
     if (!c->options->load_scan)
         return weft_fail(err, WEFT_ERR_UNSUPPORTED, "%s: scans cannot be read here",
                          weft_place_text(member->place));
-    WEFT_TRY(scan_path(member, &path, err));
+    WEFT_TRY(source_path(member, &path, err));
     *scan = (weft_scan){0};
     weft_err status = c->options->load_scan(c->options->context, path, scan, err);
     weft_free(path);
     if (status == WEFT_OK && scan->normal.planes == 0 && scan->albedo.planes == 0)
         status = weft_fail(err, WEFT_ERR_MISSING, "the scan has neither normals nor albedo");
+    return status == WEFT_OK ? WEFT_OK
+                             : weft_prefix(err, status, "%s", weft_place_text(member->value->place));
+}
+
+static weft_err open_u3m(const weft_rad_member *member, weft_u3m **u3m, weft_error *err)
+{
+    char *path;
+    WEFT_TRY(source_path(member, &path, err));
+    const weft_err status = weft_u3m_open(path, u3m, err);
+    weft_free(path);
     return status == WEFT_OK ? WEFT_OK
                              : weft_prefix(err, status, "%s", weft_place_text(member->value->place));
 }
@@ -122,6 +135,32 @@ static weft_err visit_texture(const input_visit *v, const weft_rad_record *recor
     return WEFT_OK;
 }
 
+/* The document, and of one that is no archive the files beside it. */
+static weft_err visit_u3m(const input_visit *v, const weft_rad_member *member, weft_error *err)
+{
+    char *path, *folder = NULL;
+    weft_u3m *u3m = NULL;
+    WEFT_TRY(source_path(member, &path, err));
+    v->fn(v->context, path, false);
+    weft_err status = WEFT_OK;
+    if (!weft_path_has_suffix(path, ".u3ma")) {
+        folder = weft_path_folder(path, err);
+        status = folder ? open_u3m(member, &u3m, err) : WEFT_ERR_NOMEM;
+    }
+    for (int i = 1; u3m && i < weft_u3m_files_count(u3m->files) && status == WEFT_OK; i++) {
+        char *const file = weft_path_join(folder, weft_u3m_files_name(u3m->files, i), err);
+        if (file)
+            v->fn(v->context, file, false);
+        else
+            status = WEFT_ERR_NOMEM;
+        weft_free(file);
+    }
+    weft_u3m_close(u3m);
+    weft_free(folder);
+    weft_free(path);
+    return status;
+}
+
 static weft_err visit_inputs(void *context, weft_assets *assets, const weft_rad_record *p, weft_error *err)
 {
     const input_visit *const v = context;
@@ -132,11 +171,14 @@ static weft_err visit_inputs(void *context, weft_assets *assets, const weft_rad_
             WEFT_TRY(visit_texture(v, &m->value->record, err));
     }
     const weft_rad_member *const mask = weft_rad_at(p, "mask"), *const scan = weft_rad_at(p, "scan");
+    const weft_rad_member *const u3m = weft_rad_at(p, "u3m");
     if (mask)
         WEFT_TRY(visit_texture(v, &mask->value->record, err));
+    if (u3m)
+        WEFT_TRY(visit_u3m(v, u3m, err));
     if (scan) {
         char *path;
-        WEFT_TRY(scan_path(scan, &path, err));
+        WEFT_TRY(source_path(scan, &path, err));
         v->fn(v->context, path, true);
         weft_free(path);
     }
@@ -158,6 +200,24 @@ static void grow(compositor *c, int width, int height)
     }
 }
 
+static weft_err grow_by_u3m(compositor *c, const weft_rad_member *member, weft_error *err)
+{
+    weft_u3m *u3m;
+    int width, height;
+    WEFT_TRY(open_u3m(member, &u3m, err));
+    const weft_err status = weft_u3m_measure(u3m, &width, &height, err);
+    if (status == WEFT_OK) {
+        grow(c, width, height);
+        if (!(c->size_mm[0] > 0)) {
+            memcpy(c->size_mm, u3m->size_mm, sizeof c->size_mm);
+            c->periodic = true; /* U3M's pictures repeat */
+        }
+    }
+    weft_u3m_close(u3m);
+    return status == WEFT_OK ? WEFT_OK
+                             : weft_prefix(err, status, "%s", weft_place_text(member->value->place));
+}
+
 /* The largest picture decides the size; the outermost scan of known scale the millimetres. */
 static weft_err visit_size(void *context, weft_assets *assets, const weft_rad_record *p, weft_error *err)
 {
@@ -176,6 +236,8 @@ static weft_err visit_size(void *context, weft_assets *assets, const weft_rad_re
         }
         weft_scan_fini(&scan);
     }
+    if (weft_rad_at(p, "u3m"))
+        WEFT_TRY(grow_by_u3m(c, weft_rad_at(p, "u3m"), err));
     for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) {
         const weft_rad_member *const m = weft_rad_at(p, textures[i].property);
         if (!m || !weft_rad_at(&m->value->record, "name"))
@@ -266,6 +328,31 @@ static weft_err put_scan(const compositor *c, weft_baked *baked, const weft_rad_
     return status;
 }
 
+/* Takes over what the U3M says, of quantities that the type has. */
+static weft_err put_u3m(const compositor *c, weft_baked *baked, const weft_rad_member *member,
+                        weft_error *err)
+{
+    weft_u3m *u3m;
+    weft_baked from = {0};
+    WEFT_TRY(open_u3m(member, &u3m, err));
+    const weft_err status = weft_u3m_bake(u3m, c->width, c->height, c->size_mm, &from, err);
+    for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK; k++) {
+        const weft_baked_kind kind = (weft_baked_kind)k;
+        const bool of_threads = kind == WEFT_BAKED_ANISOTROPY || kind == WEFT_BAKED_TANGENT;
+        const bool of_cloth = kind == WEFT_BAKED_CLOTH || kind == WEFT_BAKED_FRONT_TINT ||
+                              kind == WEFT_BAKED_RIM_TINT || kind == WEFT_BAKED_RIM_AMPLITUDE;
+        if (!weft_u3m_has(u3m, kind) || (of_threads && baked->type->model != WEFT_MATERIAL_ANISOTROPIC) ||
+            (of_cloth && baked->type->model != WEFT_MATERIAL_CLOTH))
+            continue;
+        drop_map(baked, kind);
+        baked->maps[kind] = from.maps[kind];
+        from.maps[kind] = (weft_baked_map){0};
+    }
+    weft_baked_fini(&from);
+    weft_u3m_close(u3m);
+    return status;
+}
+
 static weft_err put_texture(const compositor *c, weft_baked *baked, const texture_row *row,
                             const weft_rad_record *record, weft_error *err)
 {
@@ -293,8 +380,10 @@ static void steepen(weft_baked *baked, double strength)
     }
 }
 
-/* Numbers and colours that replace: property, quantity, how many components. */
-static void apply_constants(weft_baked *baked, const weft_rad_record *p, const weft_asset *inherited)
+/* Numbers and colours that replace: property, quantity, how many components.
+ * @param only_said  leave out the defaults of built-in types */
+static void apply_constants(weft_baked *baked, const weft_rad_record *p, const weft_asset *inherited,
+                            bool only_said)
 {
     static const struct {
         const char *property;
@@ -307,7 +396,8 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, const w
         {"rim_amplitude", WEFT_BAKED_RIM_AMPLITUDE, 1},  {"opacity", WEFT_BAKED_OPACITY, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         double values[3];
-        if (!own(p, rows[i].property, inherited))
+        const weft_rad_member *const m = own(p, rows[i].property, inherited);
+        if (!m || (only_said && weft_material_type_find(m->set_by)))
             continue;
         if (rows[i].planes == 3)
             weft_rad_colour(p, rows[i].property, 1, values);
@@ -315,7 +405,8 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, const w
             values[0] = weft_rad_number(p, rows[i].property, 0);
         set_constant(baked, rows[i].kind, rows[i].planes, values);
     }
-    if (own(p, "tangent_rotation_deg", inherited)) {
+    const weft_rad_member *const rotation = own(p, "tangent_rotation_deg", inherited);
+    if (rotation && !(only_said && weft_material_type_find(rotation->set_by))) {
         const double turn = weft_rad_number(p, "tangent_rotation_deg", 0) * acos(-1) / 180;
         const double direction[2] = {cos(turn), sin(turn)};
         set_constant(baked, WEFT_BAKED_TANGENT, 2, direction);
@@ -348,7 +439,15 @@ static void apply_factors(weft_baked *baked, const weft_rad_record *p, const wef
 static weft_err apply_own(const compositor *c, weft_baked *baked, const weft_rad_record *p,
                           const weft_asset *inherited, weft_error *err)
 {
-    apply_constants(baked, p, inherited);
+    const weft_rad_member *const u3m = own(p, "u3m", inherited);
+    if (u3m) { /* what its own asset and those derived from it set lies over it, what it derives from below */
+        const weft_asset *setter;
+        WEFT_TRY(weft_assets_find(c->assets, u3m->set_by, &setter, err));
+        WEFT_TRY(put_u3m(c, baked, u3m, err));
+        apply_constants(baked, p, setter->base, true);
+    } else {
+        apply_constants(baked, p, inherited, false);
+    }
     const weft_rad_member *const scan = own(p, "scan", inherited);
     if (scan)
         WEFT_TRY(put_scan(c, baked, scan, err));
@@ -438,6 +537,13 @@ static weft_err composite(const compositor *c, const weft_asset *asset, int dept
     if (status != WEFT_OK)
         weft_baked_fini(baked);
     return status;
+}
+
+weft_err weft_composite_u3m(const weft_asset *asset, char **path, weft_error *err)
+{
+    const weft_rad_member *const member = weft_rad_at(&asset->properties, "u3m");
+    *path = NULL;
+    return member ? source_path(member, path, err) : WEFT_OK;
 }
 
 weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,

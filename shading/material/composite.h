@@ -49,6 +49,9 @@ typedef struct weft_composite_options {
 weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
                         weft_baked *baked, weft_error *err);
 
+/** The path of the U3M that a material is made from, NULL of one that is not; free with weft_free(). */
+weft_err weft_composite_u3m(const weft_asset *asset, char **path, weft_error *err);
+
 /** What a file is to a material. */
 typedef void weft_composite_input_fn(void *context, const char *path, bool is_scan);
 

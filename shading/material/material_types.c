@@ -107,6 +107,7 @@ static const weft_property layer[] = {
 
 const weft_property weft_material_properties[] = {
     {.name = "scan", TEXT, .help = "a folder of solved maps (NAME.maps): its albedo, normals and scale"},
+    {.name = "u3m", TEXT, .help = "a U3M (.u3m or .u3ma): what it says of the surface, and its size"},
     {.name = "width_mm",
      NUMBER,
      .min = 0,

@@ -14,6 +14,7 @@
 #include "host/set/set.h"
 #include "shading/brdf/merl.h"
 #include "shading/material/asset.h"
+#include "shading/u3m/u3m_document.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -91,6 +92,23 @@ static void read_merl(const char *path)
         return;
     weft_brdf_eval_one(&merl->brdf, NULL, up, up, f);
     weft_merl_destroy(merl);
+}
+
+/* An archive, whole: its document and all its pictures. */
+static void read_u3ma(const char *path)
+{
+    char archive[64];
+    weft_u3m *u3m;
+    weft_baked baked;
+    int width, height;
+    snprintf(archive, sizeof archive, "%s/x.u3ma", folder_with("x.u3ma", path));
+    weft_log_set_level(WEFT_LOG_QUIET);
+    if (weft_u3m_open(archive, &u3m, NULL) != WEFT_OK)
+        return;
+    if (weft_u3m_measure(u3m, &width, &height, NULL) == WEFT_OK &&
+        weft_u3m_bake(u3m, 4, 4, u3m->size_mm, &baked, NULL) == WEFT_OK)
+        weft_baked_fini(&baked);
+    weft_u3m_close(u3m);
 }
 
 static void read_set(const char *path)

@@ -4,6 +4,7 @@
 #include "core/formats/exr_file.h"
 #include "core/formats/png_file.h"
 #include "core/formats/tiff_file.h"
+#include "core/formats/zip_file.h"
 #include "core/log.h"
 #include "firmware/protocol.h"
 
@@ -135,6 +136,22 @@ static weft_err write_frame(const char *folder, weft_error *err)
     return weft_file_write(path, wire, n - 1, err);
 }
 
+/* The parameters that are read, as constants. */
+static weft_err write_archive(const char *folder, weft_error *err)
+{
+#define NUMBER(key) "\"" key "\":{\"constant\":0.5,\"texture\":null},"
+    static const char document[] =
+        "{\"schema\":\"1.1\",\"custom\":null,\"material\":{\"name\":\"x\",\"front\":{" NUMBER("metalness")
+            NUMBER("specular_value") NUMBER("roughness") NUMBER("anisotropy_value")
+                NUMBER("anisotropy_rotation") NUMBER("alpha") NUMBER("normal") NUMBER("displacement")
+                    NUMBER("sheen_value") NUMBER("basecolor") "\"shader\":\"principled\"}}}";
+#undef NUMBER
+    const weft_zip_entry entries[] = {{"x.u3m", document, sizeof document - 1}, {"a/b.png", "x", 1}};
+    char path[1024];
+    WEFT_TRY(seed_path(folder, "u3ma", "constants", path, err));
+    return weft_zip_write(path, entries, 2, 1700000000, err);
+}
+
 int main(int argc, char **argv)
 {
     weft_error error = {0};
@@ -153,6 +170,8 @@ int main(int argc, char **argv)
         status = write_jobs(argv[1], &error);
     if (status == WEFT_OK)
         status = write_frame(argv[1], &error);
+    if (status == WEFT_OK)
+        status = write_archive(argv[1], &error);
     if (status != WEFT_OK)
         weft_log_error("%s", error.text);
     return weft_err_exit_status(status);
