@@ -470,6 +470,7 @@ static weft_err write_maps(builder *b, weft_error *err)
     }
     weft_mip_options mips = b->options->mips;
     mips.max_levels = 0;
+    note(b, "mips", "rebuilt", "of the maps below");
     WEFT_TRY(weft_mips_make(baked, &mips, err));
     for (int k = 0; k < WEFT_BAKED_COUNT; k++) {
         const weft_baked_kind kind = (weft_baked_kind)k;

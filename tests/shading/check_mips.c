@@ -1,8 +1,5 @@
-/*
- * Filtered roughness against the distribution it stands for: micro-normals are drawn about every normal of a
- * footprint, and the filtered GGX is held against them by the Kolmogorov-Smirnov distance of the polar angle,
- * over what the best GGX there is would have.
- */
+/* Mips of normals and roughness: what they keep, against normals drawn one by one. */
+#include "tests/shading/drawn_normals.h"
 #include "tests/support/support.h"
 
 #include "shading/bake/gloss.h"
@@ -14,132 +11,33 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 128, DRAWS = 2048 };
-
-static const double pi = 3.14159265358979323846;
-
-/* Heights of three fabrics in texels; u, v in texels. */
-static double plain(double u, double v)
-{
-    return 1.5 * sin(pi * u / 8) * cos(pi * v / 8);
-}
-
-static double twill(double u, double v)
-{
-    return 1.2 * sin(pi * (u + v) / 8) + 0.4 * cos(pi * u / 2) * sin(pi * v / 4);
-}
-
-static double corded(double u, double v)
-{
-    return 3 * fabs(sin(pi * u / 16)) + 0.15 * sin(pi * v / 2);
-}
-
-typedef double fabric_fn(double u, double v);
-static fabric_fn *const fabrics[] = {plain, twill, corded};
-
-static void make_normals(weft_baked *b, fabric_fn *fabric)
-{
-    const double e = 1e-3;
-    assert_ok(weft_baked_init(b, "f", weft_material_type_find("opaquematerial"), err));
-    assert_ok(weft_baked_add(b, WEFT_BAKED_NORMAL, SIDE, SIDE, err));
-    for (int y = 0; y < SIDE; y++)
-        for (int x = 0; x < SIDE; x++) {
-            const double u = x + 0.5, v = y + 0.5;
-            const double dx = (fabric(u + e, v) - fabric(u - e, v)) / (2 * e);
-            const double dy = (fabric(u, v + e) - fabric(u, v - e)) / (2 * e),
-                         l = sqrt(dx * dx + dy * dy + 1);
-            weft_image *const n = &b->maps[WEFT_BAKED_NORMAL].mips[0];
-            weft_image_row(n, 0, y)[x] = (float)(-dx / l);
-            weft_image_row(n, 1, y)[x] = (float)(dy / l);
-            weft_image_row(n, 2, y)[x] = (float)(1 / l);
-        }
-}
-
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* tan of the polar angle of micro-normals of a footprint against its mean normal, sorted. */
-static void draw(const weft_baked *b, int level, int tx, int ty, double alpha, double *tangents)
-{
-    const weft_image *const n0 = &b->maps[WEFT_BAKED_NORMAL].mips[0], *const nl = &b->maps[WEFT_BAKED_NORMAL]
-                                                                                       .mips[level];
-    double mean[3];
-    for (int c = 0; c < 3; c++)
-        mean[c] = (double)weft_image_row(nl, c, ty)[tx];
-    uint64_t random = (uint64_t)level * 1000 + (uint64_t)(ty * SIDE + tx) + 1;
-    const int side = 1 << level;
-    for (int k = 0; k < DRAWS; k++) {
-        /* strata over the footprint and over the lobe */
-        const int cell = side * side <= DRAWS ? k % (side * side)
-                                              : (int)((k + weft_test_random(&random)) * side * side / DRAWS);
-        const int x = tx * side + cell % side, y = ty * side + cell / side;
-        double n[3], m[3];
-        for (int c = 0; c < 3; c++)
-            n[c] = (double)weft_image_row(n0, c, y)[x];
-        const double u = weft_test_random(&random), phi = 2 * pi * weft_test_random(&random);
-        const double cos_m = sqrt((1 - u) / (1 + (alpha * alpha - 1) * u)), sin_m = sqrt(1 - cos_m * cos_m);
-        const double tl = hypot(n[0], n[2]), t[3] = {n[2] / tl, 0, -n[0] / tl};
-        const double s[3] = {n[1] * t[2], n[2] * t[0] - n[0] * t[2], -n[1] * t[0]};
-        for (int c = 0; c < 3; c++)
-            m[c] = sin_m * (cos(phi) * t[c] + sin(phi) * s[c]) + cos_m * n[c];
-        const double cosine = m[0] * mean[0] + m[1] * mean[1] + m[2] * mean[2];
-        tangents[k] = cosine > 1e-3 ? sqrt(fmax(1 - cosine * cosine, 0)) / cosine : 1e3;
-    }
-    qsort(tangents, DRAWS, sizeof *tangents, by_value);
-}
-
-/* Largest distance of the two cumulative distributions; that of GGX is t^2/(t^2 + alpha^2). */
-static double distance(const double *tangents, double alpha)
-{
-    double most = 0;
-    for (int k = 0; k < DRAWS; k++) {
-        const double t2 = tangents[k] * tangents[k], model = t2 / (t2 + alpha * alpha);
-        most = fmax(most, fmax(fabs(model - (double)k / DRAWS), fabs(model - (k + 1.0) / DRAWS)));
-    }
-    return most;
-}
-
-static double least_distance(const double *tangents)
-{
-    double least = 1;
-    for (double alpha = 0.01; alpha <= 1; alpha *= 1.02)
-        least = fmin(least, distance(tangents, alpha));
-    return least;
-}
+enum { SIDE = DRAWN_SIDE };
 
 static void check_against_drawn_normals(void **state)
 {
     (void)state;
-    static const double roughness[] = {0.05, 0.1, 0.2, 0.35, 0.5};
-    static double tangents[DRAWS];
     double sum[6] = {0}, worst[6] = {0};
     int n = 0;
-    for (int f = 0; f < 3; f++)
-        for (int r = 0; r < 5; r++) {
+    for (int f = 0; f < DRAWN_FABRICS; f++)
+        for (int r = 0; r < DRAWN_ALPHAS; r++) {
             weft_baked b[6];
             for (int rule = 0; rule < 6; rule++) {
                 weft_mip_options options = {.rule = (weft_mip_rule)rule, .max_levels = 7};
-                make_normals(&b[rule], fabrics[f]);
-                b[rule].maps[WEFT_BAKED_ROUGHNESS].constant[0] = (float)roughness[r];
+                drawn_normals_make(&b[rule], f);
+                b[rule].maps[WEFT_BAKED_ROUGHNESS].constant[0] = (float)drawn_alphas[r];
                 assert_ok(weft_mips_make(&b[rule], &options, err));
             }
-            for (int level = 1; level <= 6; level++) {
-                const int side = SIDE >> level, step = side > 3 ? side / 3 : 1;
-                for (int y = step / 2; y < side; y += step)
-                    for (int x = step / 2; x < side; x += step, n++) {
-                        draw(&b[0], level, x, y, roughness[r], tangents);
-                        const double least = least_distance(tangents);
-                        for (int rule = 0; rule < 6; rule++) {
-                            const double alpha = (double)weft_image_row(
-                                &b[rule].maps[WEFT_BAKED_ROUGHNESS].mips[level], 0, y)[x];
-                            const double excess = fmax(distance(tangents, alpha) - least, 0);
-                            sum[rule] += excess;
-                            worst[rule] = fmax(worst[rule], excess);
-                        }
-                    }
+            for (drawn_footprint at = {0}; drawn_next(&at); n++) {
+                drawn_tangents tangents;
+                drawn_normals_draw(&b[0], &at, drawn_alphas[r], &tangents);
+                const double least = drawn_least_distance(&tangents);
+                for (int rule = 0; rule < 6; rule++) {
+                    const weft_image *const alphas = &b[rule].maps[WEFT_BAKED_ROUGHNESS].mips[at.level];
+                    const double alpha = (double)weft_image_row(alphas, 0, at.y)[at.x];
+                    const double excess = fmax(drawn_distance(&tangents, alpha) - least, 0);
+                    sum[rule] += excess;
+                    worst[rule] = fmax(worst[rule], excess);
+                }
             }
             for (int rule = 0; rule < 6; rule++)
                 weft_baked_fini(&b[rule]);
@@ -185,7 +83,7 @@ static void check_average_toksvig(void **state)
     (void)state;
     weft_baked b;
     const weft_mip_options options = {.rule = WEFT_MIP_TOKSVIG};
-    make_normals(&b, plain);
+    drawn_normals_make(&b, 0);
     b.maps[WEFT_BAKED_ROUGHNESS].constant[0] = 0.1F;
     assert_near(weft_toksvig_average_gloss(&b, 3), log2(2 / 0.01 - 2) / 13, 1e-6); /* no map of lengths yet */
     assert_ok(weft_mips_make(&b, &options, err));
