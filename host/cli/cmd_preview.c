@@ -18,8 +18,9 @@ typedef struct preview_args {
     const char *output, *brdf, *match, *cal, *env, *columns;
     weft_texts params, lamps;
     weft_numbers light, light_mm, crop, sky;
-    int shape, area, sky_model, tone, sweep;
-    bool draft;
+    int shape, area, sky_model, tone, sweep, shadow_steps, shadow_blur, folds, voxels;
+    bool draft, self_shadow;
+    const char *height_map;
     weft_size size;
     double exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
@@ -164,6 +165,41 @@ static const weft_field fields[] = {
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(preview_args, draft),
      .help = "one sample a pixel: quick, and right for materials, whose mips are filtered"},
+    {.key = "self-shadow",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(preview_args, self_shadow),
+     .help = "the cloth's height map throws shadows on the cloth: from solve --height, or the material's"},
+    {.key = "height-map",
+     .type = WEFT_FIELD_TEXT,
+     .offset = offsetof(preview_args, height_map),
+     .unit = "FILE",
+     .help = "the heights of --self-shadow in mm (EXR), in place of those of INPUT"},
+    {.key = "shadow-steps",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, shadow_steps),
+     .min = 1,
+     .max = 4096,
+     .def = "64",
+     .help = "looks at most along a ray through the relief; fewer are quicker and coarser"},
+    {.key = "shadow-blur",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, shadow_blur),
+     .choices = "coarse|always|never",
+     .def = "coarse",
+     .help = "dither and blur shadows where a ray is coarse or a lamp large, or everywhere, or nowhere"},
+    {.key = "folds",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, folds),
+     .choices = "formula|marched|walked",
+     .def = "formula",
+     .help = "shadows of the drape's folds: by their formula, or through a grid of voxels"},
+    {.key = "voxels",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, voxels),
+     .min = 8,
+     .max = 512,
+     .def = "128",
+     .help = "of that grid, along the drape's width"},
     {.key = "match",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(preview_args, match),
@@ -308,6 +344,12 @@ static weft_err set_view(const preview_args *a, weft_preview_view *view, weft_er
     view->repeat = a->repeat;
     view->fov_deg = a->fov_deg;
     view->draft = a->draft;
+    view->shadows = (weft_preview_shadows){.relief = a->self_shadow,
+                                           .blur = (weft_preview_blur)a->shadow_blur,
+                                           .steps = a->shadow_steps,
+                                           .folds = (weft_preview_folds)a->folds,
+                                           .voxels = a->voxels,
+                                           .voxel_steps = a->voxels < 32 ? 8 : a->voxels / 4};
     return WEFT_OK;
 }
 
@@ -340,6 +382,8 @@ static weft_err look_at_input(const weft_invocation *inv, const preview_args *a,
     view->height = size.height;
     if (status == WEFT_OK && view->crop.width == 0)
         status = weft_preview_input_level(&input, texels_per_px(a, &input.surface, size), err);
+    if (status == WEFT_OK && a->self_shadow)
+        status = weft_preview_input_height(&input, folder, a->height_map, err);
     if (status == WEFT_OK)
         status = a->sweep ? sweep(inv, a, &input, view, seconds, err)
                           : look(a, a->output, &input, view, seconds, err);
@@ -374,6 +418,10 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
     weft_preview_view view = weft_preview_view_defaults();
     weft_preview_around around = {0};
     double seconds = 0;
+    if (a->self_shadow && (a->match || a->columns))
+        return weft_fail(err, WEFT_ERR_USAGE, "--self-shadow goes with neither --match nor --columns");
+    if (a->height_map && !a->self_shadow)
+        return weft_fail(err, WEFT_ERR_USAGE, "--height-map wants --self-shadow");
     if (!a->match != !a->cal)
         return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
     if (a->match && !inv->n_operands)

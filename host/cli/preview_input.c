@@ -95,6 +95,7 @@ static weft_err use_level(weft_preview_input *input, int level, weft_error *err)
     weft_baked *const baked = &input->baked;
     weft_preview_surface *const surface = &input->surface;
     const weft_baked_map *const normal = &baked->maps[WEFT_BAKED_NORMAL];
+    input->level = level;
     surface->width = baked->width >> level > 0 ? baked->width >> level : 1;
     surface->height = baked->height >> level > 0 ? baked->height >> level : 1;
     surface->mm_per_px = baked->size_mm[0] / surface->width;
@@ -174,8 +175,41 @@ weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_p
     return use_level(input, level, err);
 }
 
+static weft_err read_height(weft_preview_input *input, const char *path, weft_error *err)
+{
+    WEFT_TRY(weft_image_read(path, WEFT_TRANSFER_LINEAR, &input->height_mm, err));
+    if (input->height_mm.planes != 1)
+        return weft_fail(err, WEFT_ERR_MISMATCH, "%s has %d planes; heights are one", path,
+                         input->height_mm.planes);
+    input->surface.height_mm = &input->height_mm;
+    return WEFT_OK;
+}
+
+weft_err weft_preview_input_height(weft_preview_input *input, const char *folder, const char *file,
+                                   weft_error *err)
+{
+    const weft_baked_map *const baked = &input->baked.maps[WEFT_BAKED_HEIGHT];
+    if (file)
+        return read_height(input, file, err);
+    if (input->level < baked->n_mips) {
+        input->surface.height_mm = &baked->mips[input->level];
+        return WEFT_OK;
+    }
+    char *const path = folder ? weft_path_join(folder, "height.exr", err) : NULL;
+    if (folder && !path)
+        return WEFT_ERR_NOMEM;
+    const bool found = path && weft_file_exists(path);
+    const weft_err status = found ? read_height(input, path, err)
+                                  : weft_fail(err, WEFT_ERR_MISSING,
+                                              "there is no height map that could throw shadows (solve with "
+                                              "--height poisson, or give --height-map)");
+    weft_free(path);
+    return status;
+}
+
 void weft_preview_input_fini(weft_preview_input *input)
 {
+    weft_image_fini(&input->height_mm);
     for (int i = 0; i < input->n_extra; i++)
         weft_image_fini(&input->extra[i]);
     weft_maps_fini(&input->maps);

@@ -16,6 +16,8 @@ typedef struct weft_preview_input {
     weft_texts params;
     int n_extra;
     weft_image extra[WEFT_TEXTS_MAX]; /* maps of parameters: --param alpha=roughness.exr */
+    weft_image height_mm; /* of weft_preview_input_height(), when it was read */
+    int level;            /* of the material's mips that is shown */
     weft_preview_surface surface;
 } weft_preview_input;
 
@@ -34,6 +36,14 @@ weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, 
 /** Shows a level of a material's mips, the first with at most `texels_per_px` texels a pixel; its roughness
  *  answers for the normals that it averages.  Does nothing to maps.  Before this it is level 0. */
 weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_px, weft_error *err);
+
+/**
+ * Gives the surface its heights: of `file` (EXR, mm, the size of the maps), else the material's, else the
+ * height.exr of the folder of maps.
+ * @return WEFT_ERR_MISSING saying how to get one
+ */
+weft_err weft_preview_input_height(weft_preview_input *input, const char *folder, const char *file,
+                                   weft_error *err);
 
 void weft_preview_input_fini(weft_preview_input *input);
 

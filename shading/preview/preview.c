@@ -1,6 +1,7 @@
 #include "shading/preview/preview.h"
 
 #include "shading/preview/preview_samples.h"
+#include "shading/preview/preview_visibility.h"
 
 #include "core/clones.h"
 #include "core/parallel.h"
@@ -18,7 +19,12 @@ void weft_preview_direction(double azimuth_deg, double elevation_deg, double dir
 
 weft_preview_view weft_preview_view_defaults(void)
 {
-    weft_preview_view view = {.width = 512, .height = 512, .n_lights = 1, .background = 0.18, .repeat = 1};
+    weft_preview_view view = {.width = 512,
+                              .height = 512,
+                              .n_lights = 1,
+                              .background = 0.18,
+                              .repeat = 1,
+                              .shadows = {.steps = 64, .voxels = 128, .voxel_steps = 32}};
     weft_preview_direction(135, 45, view.lights[0].direction);
     for (int c = 0; c < 3; c++)
         view.lights[0].irradiance[c] = WEFT_PI;
@@ -197,6 +203,32 @@ weft_err weft_preview_whole(const weft_preview_surface *surface, weft_preview_cr
     return WEFT_OK;
 }
 
+static weft_err check_shadows(const weft_preview_surface *surface, const weft_preview_view *view,
+                              weft_error *err)
+{
+    const weft_preview_shadows *const shadows = &view->shadows;
+    if (shadows->relief && !surface->height_mm)
+        return weft_fail(err, WEFT_ERR_MISSING,
+                         "there is no height map that could throw shadows (solve with --height)");
+    if (shadows->relief && !(surface->mm_per_px > 0))
+        return weft_fail(err, WEFT_ERR_MISSING,
+                         "shadows of the relief want maps with a scale; solve with --geometry plane");
+    if (shadows->relief && (shadows->steps < 1 || shadows->steps > 100000))
+        return weft_fail(err, WEFT_ERR_RANGE, "wanted 1 to 100000 steps through the relief");
+    if (shadows->folds == WEFT_PREVIEW_FOLDS_MARCHED &&
+        (shadows->voxel_steps < 1 || shadows->voxel_steps > 100000))
+        return weft_fail(err, WEFT_ERR_RANGE, "wanted 1 to 100000 steps through the voxels");
+    return shadows->relief ? check_size(surface, surface->height_mm, "height", err) : WEFT_OK;
+}
+
+/* Whether rays are looked at before the picture is shaded. */
+static bool wants_visibility(const weft_preview_view *view)
+{
+    return view->n_lights > 0 &&
+           (view->shadows.relief ||
+            (view->shape == WEFT_PREVIEW_DRAPE && view->shadows.folds != WEFT_PREVIEW_FOLDS_FORMULA));
+}
+
 static weft_err check_surface(const weft_preview_surface *surface, const weft_preview_view *view,
                               weft_error *err)
 {
@@ -213,6 +245,7 @@ static weft_err check_surface(const weft_preview_surface *surface, const weft_pr
             return weft_fail(err, WEFT_ERR_MISSING,
                              "a light at a position in mm needs maps with a scale; these have none (solve "
                              "with --geometry plane, or give the light as azimuth and elevation)");
+    WEFT_TRY(check_shadows(surface, view, err));
     if (!(view->repeat > 0 && view->repeat <= 1000) || !(view->fov_deg >= 0 && view->fov_deg < 170))
         return weft_fail(err, WEFT_ERR_RANGE, "wanted a repeat of more than 0 and a field of view below 170");
     return WEFT_OK;
@@ -254,22 +287,29 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
                              weft_image *picture, weft_error *err)
 {
     weft_preview_setup setup = {.surface = surface, .view = view};
-    weft_image made;
+    weft_image made = {0};
     WEFT_TRY(check_surface(surface, view, err));
     WEFT_TRY(find_crop(surface, view, &setup.crop, err));
     set_ranges(&setup);
     weft_preview_setup_shape(&setup);
     if (view->draft)
         setup.supersampling = 1;
-    WEFT_TRY(weft_image_init(&made, view->width, view->height, 3, err));
+    weft_preview_visibility visibility = {0};
     weft_err status = WEFT_OK;
-    if (view->surroundings.map)
+    if (wants_visibility(view)) {
+        status = weft_preview_visibility_init(&visibility, &setup, err);
+        setup.visibility = &visibility;
+    }
+    if (status == WEFT_OK && view->surroundings.map)
         status = weft_environment_planes_init(&setup.around, view->surroundings.map, view->surroundings.table,
                                               err);
+    if (status == WEFT_OK)
+        status = weft_image_init(&made, view->width, view->height, 3, err);
     if (status == WEFT_OK)
         status =
             weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
     weft_environment_planes_fini(&setup.around);
+    weft_preview_visibility_fini(&visibility);
     if (status != WEFT_OK)
         weft_image_fini(&made);
     else

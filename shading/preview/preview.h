@@ -86,7 +86,8 @@ typedef struct weft_preview_surface {
     double mm_per_px;         /* 0: unknown (no point lights then) */
     double origin_mm[2];      /* world x, y of the centre of pixel (0, 0); for point lights over the plane */
     const weft_image *normal; /* [3]; NULL: flat.  Need not be unit length; (0,0,0) counts as (0,0,1) */
-    const weft_mask *mask;    /* 0 shows the background; NULL: all of it is the sample */
+    const weft_image *height_mm; /* 1 plane; NULL: unknown */
+    const weft_mask *mask;       /* 0 shows the background; NULL: all of it is the sample */
     const weft_brdf *brdf;
     double params[WEFT_BRDF_MAX_PLANES];         /* constants, see weft_brdf_defaults() */
     weft_preview_map maps[WEFT_BRDF_MAX_PLANES]; /* override the constants; clamped to their ranges */
@@ -106,6 +107,31 @@ typedef struct weft_preview_crop {
  *  @return WEFT_ERR_NODATA when the mask is empty */
 weft_err weft_preview_whole(const weft_preview_surface *surface, weft_preview_crop *crop, weft_error *err);
 
+/** How the folds of the drape keep the light from each other. */
+typedef enum weft_preview_folds {
+    WEFT_PREVIEW_FOLDS_FORMULA, /* each sample marches over their formula: right, no voxels */
+    WEFT_PREVIEW_FOLDS_MARCHED, /* a grid of voxels, looked at a few times (S-BLG-10) */
+    WEFT_PREVIEW_FOLDS_WALKED,  /* the same grid, no voxel left out */
+} weft_preview_folds;
+
+/** Which looks are dithered and then blurred. */
+typedef enum weft_preview_blur {
+    WEFT_PREVIEW_BLUR_COARSE, /* where a look could miss something, or sees a point of a large lamp */
+    WEFT_PREVIEW_BLUR_ALWAYS,
+    WEFT_PREVIEW_BLUR_NEVER,
+} weft_preview_blur;
+
+/** Shadows that are looked for once a place, dithered and blurred (S-BLG-06).  {0}: none of them. */
+typedef struct weft_preview_shadows {
+    bool relief; /* surface->height_mm shadows itself */
+    weft_preview_blur blur;
+    int steps; /* of a ray through the relief; at least 1 with `relief` */
+    weft_preview_folds folds;
+    int voxels;      /* along the drape's width, 8..512 */
+    int voxel_steps; /* of a marched ray; a quarter of the voxels is about one each */
+    int phase;       /* of the dither: the frame of a sequence */
+} weft_preview_shadows;
+
 /** How it is looked at.  weft_preview_view_defaults() fills it. */
 typedef struct weft_preview_view {
     int width, height;
@@ -113,6 +139,7 @@ typedef struct weft_preview_view {
     int n_lights;
     weft_preview_light lights[WEFT_PREVIEW_MAX_LIGHTS];
     weft_preview_surroundings surroundings;
+    weft_preview_shadows shadows;
     double ambient;         /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
     double exposure_ev;     /* the picture is multiplied by 2^exposure_ev */
     double background;      /* linear grey, not exposed */
@@ -130,7 +157,8 @@ weft_preview_view weft_preview_view_defaults(void);
  *
  * @param picture  uninitialised; gets 3 planes, linear, not clamped above 1
  * @return WEFT_ERR_RANGE, WEFT_ERR_MISMATCH for maps of different sizes, WEFT_ERR_MISSING for a point light
- *         over a map of unknown scale, WEFT_ERR_NODATA for an empty mask, WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
+ *         over a map of unknown scale or shadows of a relief without a height map, WEFT_ERR_NODATA for an
+ * empty mask, WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
  */
 weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
                              weft_image *picture, weft_error *err);

@@ -1,4 +1,5 @@
 #include "shading/preview/preview_samples.h"
+#include "shading/preview/preview_visibility.h"
 
 #include "shading/brdf/half_vector.h"
 
@@ -31,6 +32,7 @@ static void aim_at(weft_preview_samples *s, int i, const double point_mm[3], dou
     const double r2 = distance2(d), inverse = 1 / sqrt(r2);
     for (int c = 0; c < 3; c++)
         s->lamp[c][i] = (float)(d[c] * inverse);
+    s->reach_mm[i] = (float)(r2 * inverse);
     s->irradiance[i] = (float)(weight * origin2 / r2);
 }
 
@@ -56,33 +58,33 @@ static void aim_at_ball(const weft_preview_light *light, weft_preview_samples *s
     const double b[3] = {d[1] * t[2] - d[2] * t[1], d[2] * t[0] - d[0] * t[2], d[0] * t[1] - d[1] * t[0]};
     for (int c = 0; c < 3; c++)
         s->lamp[c][i] = (float)(z * d[c] + r * (cos(phi) * t[c] + sin(phi) * b[c]));
+    s->reach_mm[i] = (float)(r2 * inverse);
     /* 2 pi reach / (pi sine2) */
     s->irradiance[i] = (float)(2 * reach / sine2 * at_origin2(light) / r2 / WEFT_PREVIEW_AREA_POINTS);
 }
 
-static void aim(const weft_preview_light *light, weft_preview_samples *s, int k)
+void weft_preview_aim(const weft_preview_light *light, weft_preview_samples *s, int i, int k)
 {
-    const double origin2 = at_origin2(light), t = (k + 0.5) / WEFT_PREVIEW_AREA_POINTS;
+    const double t = (k + 0.5) / WEFT_PREVIEW_AREA_POINTS;
     double point[3];
-    for (int c = 0; c < 3; c++)
-        point[c] = light->position_mm[c] + t * (light->end_mm[c] - light->position_mm[c]);
-    for (int i = 0; i < s->n; i++)
-        switch (light->kind) {
-        case WEFT_PREVIEW_DISTANT:
-            for (int c = 0; c < 3; c++)
-                s->lamp[c][i] = (float)light->direction[c];
-            s->irradiance[i] = 1;
-            break;
-        case WEFT_PREVIEW_POINT:
-            aim_at(s, i, light->position_mm, origin2, 1);
-            break;
-        case WEFT_PREVIEW_BALL:
-            aim_at_ball(light, s, i, k);
-            break;
-        case WEFT_PREVIEW_TUBE:
-            aim_at(s, i, point, origin2, 1.0 / WEFT_PREVIEW_AREA_POINTS);
-            break;
-        }
+    switch (light->kind) {
+    case WEFT_PREVIEW_DISTANT:
+        for (int c = 0; c < 3; c++)
+            s->lamp[c][i] = (float)light->direction[c];
+        s->irradiance[i] = 1;
+        break;
+    case WEFT_PREVIEW_POINT:
+        aim_at(s, i, light->position_mm, at_origin2(light), 1);
+        break;
+    case WEFT_PREVIEW_BALL:
+        aim_at_ball(light, s, i, k);
+        break;
+    case WEFT_PREVIEW_TUBE:
+        for (int c = 0; c < 3; c++)
+            point[c] = light->position_mm[c] + t * (light->end_mm[c] - light->position_mm[c]);
+        aim_at(s, i, point, at_origin2(light), 1.0 / WEFT_PREVIEW_AREA_POINTS);
+        break;
+    }
 }
 
 /*
@@ -103,17 +105,19 @@ static float shape_shadow(const weft_preview_setup *setup, const weft_preview_sa
         return 1;
     const float product = nl * (gn > 1e-3F ? gn : 1e-3F), g = gl < product ? gl / product : 1;
     const float soft = g * (1 + g * (1 - g));
-    if (setup->view->shape != WEFT_PREVIEW_DRAPE)
+    if (setup->view->shape != WEFT_PREVIEW_DRAPE || setup->view->shadows.folds != WEFT_PREVIEW_FOLDS_FORMULA)
         return soft;
-    const double at[3] = {(double)s->x[i], (double)s->y[i], 0};
+    const double at[2] = {s->drape[0][i], s->drape[1][i]};
     const double lamp[3] = {(double)s->lamp[0][i], (double)s->lamp[1][i], (double)s->lamp[2][i]};
-    return soft * (float)weft_preview_drape_light(setup, at, lamp);
+    return soft * (float)weft_preview_drape_light(at, lamp);
 }
 
 void weft_preview_shadow(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     for (int i = 0; i < s->n; i++)
         s->irradiance[i] *= shape_shadow(setup, s, i);
+    for (int i = 0; i < s->n && setup->visibility; i++)
+        s->irradiance[i] *= s->visible[i];
 }
 
 /* Adds f E for the lamp directions that are set. */
@@ -135,12 +139,15 @@ void weft_preview_add_light(const weft_preview_setup *setup, const weft_preview_
                             weft_preview_samples *s)
 {
     const bool large = light->kind == WEFT_PREVIEW_BALL || light->kind == WEFT_PREVIEW_TUBE;
+    if (setup->visibility)
+        weft_preview_see(setup, (int)(light - setup->view->lights), s);
     if (large && light->area == WEFT_PREVIEW_REPRESENTATIVE && setup->alpha_plane >= 0) {
         weft_preview_add_representative(setup, light, s);
         return;
     }
     for (int k = 0; k < (large ? WEFT_PREVIEW_AREA_POINTS : 1); k++) {
-        aim(light, s, k);
+        for (int i = 0; i < s->n; i++)
+            weft_preview_aim(light, s, i, k);
         add_lamp(setup, light, s);
     }
 }

@@ -18,7 +18,10 @@ typedef struct weft_preview_samples {
     float axis[3][3][WEFT_PREVIEW_RUN];              /* world: tangent, bitangent, normal of the shape */
     float eye[3][WEFT_PREVIEW_RUN];                  /* world, unit, towards the viewer */
     float frame[3][3][WEFT_PREVIEW_RUN];             /* world: tangent, bitangent, normal of the map */
+    double drape[2][WEFT_PREVIEW_RUN];               /* drape: where it hangs, x and y in half widths */
     float lamp[3][WEFT_PREVIEW_RUN];                 /* world, unit, towards the light */
+    float reach_mm[WEFT_PREVIEW_RUN];                /* to the light; distant ones: unset */
+    float visible[WEFT_PREVIEW_RUN];                 /* share of the light past relief and folds */
     int at[4][WEFT_PREVIEW_RUN];                     /* the four texels around the place, index in a plane */
     float share[4][WEFT_PREVIEW_RUN];                /* of each; masked ones have none */
     float sign[2][WEFT_PREVIEW_RUN];   /* of the normal: -1 where a mirrored repeat turned X or Y round */
@@ -33,18 +36,21 @@ typedef struct weft_preview_samples {
 } weft_preview_samples;
 
 /** What is the same for all samples of a picture. */
+struct weft_preview_visibility;
+
 typedef struct weft_preview_setup {
     const weft_preview_surface *surface;
     const weft_preview_view *view;
     weft_preview_crop crop;
-    int supersampling;              /* samples along a side of a pixel; even, or 1 */
-    double texels_per_px;           /* plane: map pixels an output pixel; sphere: at the pole */
-    double radius_px;               /* sphere: of its outline, output pixels */
-    double radius_texels;           /* sphere: of the sphere, map pixels */
-    double eye_distance;            /* 0: orthographic; plane: output pixels, sphere: radii */
-    int albedo_plane;               /* first plane of the parameter "albedo"; -1 when the model has none */
-    int alpha_plane;                /* of "alpha"; -1 when the model has none */
-    weft_environment_planes around; /* the view's surroundings; empty without */
+    int supersampling;    /* samples along a side of a pixel; even, or 1 */
+    double texels_per_px; /* plane: map pixels an output pixel; sphere: at the pole */
+    double radius_px;     /* sphere: of its outline, output pixels */
+    double radius_texels; /* sphere: of the sphere, map pixels */
+    double eye_distance;  /* 0: orthographic; plane: output pixels, sphere: radii */
+    int albedo_plane;     /* first plane of the parameter "albedo"; -1 when the model has none */
+    int alpha_plane;      /* of "alpha"; -1 when the model has none */
+    const struct weft_preview_visibility *visibility;             /* NULL: no shadows but those by formula */
+    weft_environment_planes around;                               /* the view's surroundings; empty without */
     double low[WEFT_BRDF_MAX_PLANES], high[WEFT_BRDF_MAX_PLANES]; /* ranges of the parameters */
 } weft_preview_setup;
 
@@ -54,9 +60,23 @@ void weft_preview_setup_shape(weft_preview_setup *setup);
 /** Fills hit, u, v, position, axis and eye from x and y. */
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s);
 
-/** Share of the light that reaches a place of the drape past the other folds: 1 or 0. */
-double weft_preview_drape_light(const weft_preview_setup *setup, const double position_px[3],
-                                const double lamp[3]);
+/** Amplitude of the drape's deepest folds, in half widths. */
+#define WEFT_PREVIEW_DRAPE_DEPTH 0.14
+
+/** Height of the drape and its slopes at (x, y), -1..1; lengths in half widths. */
+double weft_preview_drape_height(double x, double y, double slope[2]);
+
+/** Share of the light that reaches a place (x, y) of the drape, in half widths, past the other folds: 1 or 0.
+ */
+double weft_preview_drape_light(const double place[2], const double lamp[3]);
+
+/** Sample i from the middle of the shape, in map texels. */
+void weft_preview_place(const weft_preview_setup *setup, const weft_preview_samples *s, int i,
+                        double place[3]);
+
+/** Points sample i's lamp at a light (at its point k of WEFT_PREVIEW_AREA_POINTS when it is large), and sets
+ *  its irradiance and reach. */
+void weft_preview_aim(const weft_preview_light *light, weft_preview_samples *s, int i, int k);
 
 /** Shades the samples under one light of the view and adds to radiance. */
 void weft_preview_add_light(const weft_preview_setup *setup, const weft_preview_light *light,

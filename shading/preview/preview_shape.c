@@ -6,8 +6,8 @@
 #define SPHERE_SHARE      0.92 /* of the shorter side that the sphere's outline takes */
 #define ROLL_SHARE        0.7  /* the same of a roll */
 #define MAX_SUPERSAMPLING 16
-#define FOLDS             2.5  /* of the drape, over its width */
-#define FOLD_DEPTH        0.14 /* amplitude at the lower edge, of half the width; a third of it at the top */
+#define FOLDS             2.5                      /* of the drape, over its width */
+#define FOLD_DEPTH        WEFT_PREVIEW_DRAPE_DEPTH /* at the lower edge; a third of it at the top */
 
 static int even_at_least(double samples)
 {
@@ -174,8 +174,7 @@ static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
     }
 }
 
-/* Height of the drape and its slopes; lengths in half widths. */
-static double drape_height(double x, double y, double slope[2])
+double weft_preview_drape_height(double x, double y, double slope[2])
 {
     const double k = WEFT_PI * FOLDS, deep = FOLD_DEPTH * (2 - y) / 3; /* y 1 above: 1/3, y -1: 1 */
     const double bend = 0.35 * (y + 1);                                /* folds lean a little */
@@ -191,7 +190,7 @@ static double drape_length(double x, double y)
     enum { STEPS = 16 };
     double sum = 0, slope[2];
     for (int i = 0; i <= STEPS; i++) {
-        drape_height(x * i / STEPS, y, slope);
+        weft_preview_drape_height(x * i / STEPS, y, slope);
         sum += (i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2) * sqrt(1 + slope[0] * slope[0]);
     }
     return x * sum / (3 * STEPS);
@@ -217,8 +216,10 @@ static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
     for (int i = 0; i < s->n; i++) {
         double slope[2];
         const double x = (double)s->x[i] / setup->radius_px, y = (double)s->y[i] / setup->radius_px;
-        const double z = drape_height(x, y, slope);
+        const double z = weft_preview_drape_height(x, y, slope);
         s->hit[i] = fabs(x) <= 1 && fabs(y) <= 1;
+        s->drape[0][i] = x;
+        s->drape[1][i] = y;
         s->u[i] = setup->crop.width / 2.0 - 0.5 + half * drape_length(x, y);
         s->v[i] = setup->crop.height / 2.0 - 0.5 - half * y;
         s->position_mm[0][i] = (float)(x * scale);
@@ -230,22 +231,48 @@ static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
 }
 
 /* Marches towards the light until the ray is above all folds. */
-double weft_preview_drape_light(const weft_preview_setup *setup, const double position_px[3],
-                                const double lamp[3])
+double weft_preview_drape_light(const double place[2], const double lamp[3])
 {
     enum { STEPS = 48 };
-    const double x = position_px[0] / setup->radius_px, y = position_px[1] / setup->radius_px;
+    const double x = place[0], y = place[1];
     double slope[2];
-    const double z = drape_height(x, y, slope), across = sqrt(lamp[0] * lamp[0] + lamp[1] * lamp[1]);
+    const double z = weft_preview_drape_height(x, y, slope),
+                 across = sqrt(lamp[0] * lamp[0] + lamp[1] * lamp[1]);
     const double reach = lamp[2] > 0 ? (FOLD_DEPTH - z) / lamp[2] : 2 / weft_max(across, 1e-6);
     for (int k = 1; k <= STEPS; k++) {
         const double t = 0.01 + reach * k / STEPS, px = x + t * lamp[0], py = y + t * lamp[1];
         if (fabs(px) > 1 || fabs(py) > 1)
             break;
-        if (z + t * lamp[2] < drape_height(px, py, slope) - 1e-3)
+        if (z + t * lamp[2] < weft_preview_drape_height(px, py, slope) - 1e-3)
             return 0;
     }
     return 1;
+}
+
+void weft_preview_place(const weft_preview_setup *setup, const weft_preview_samples *s, int i,
+                        double place[3])
+{
+    const double radius = setup->radius_texels, x = s->drape[0][i], y = s->drape[1][i];
+    double slope[2];
+    switch (setup->view->shape) {
+    case WEFT_PREVIEW_PLANE:
+        place[0] = s->u[i] + 0.5 - setup->crop.width / 2.0;
+        place[1] = setup->crop.height / 2.0 - 0.5 - s->v[i];
+        place[2] = 0;
+        break;
+    case WEFT_PREVIEW_SPHERE:
+    case WEFT_PREVIEW_CYLINDER:
+        for (int c = 0; c < 3; c++)
+            place[c] = radius * (double)s->axis[2][c][i];
+        if (setup->view->shape == WEFT_PREVIEW_CYLINDER)
+            place[1] = setup->crop.height / 2.0 - 0.5 - s->v[i];
+        break;
+    case WEFT_PREVIEW_DRAPE:
+        place[0] = radius * x;
+        place[1] = radius * y;
+        place[2] = radius * weft_preview_drape_height(x, y, slope);
+        break;
+    }
 }
 
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s)

@@ -28,7 +28,7 @@ static void fill_pixel(weft_maps *maps, int column, int row)
     const double x = maps->origin_mm[0] + column * MM_PER_PX, y = maps->origin_mm[1] - row * MM_PER_PX,
                  d = 0.01;
     bool warp, ignored;
-    weave_height(x, y, &warp);
+    weft_image_row(&maps->height_mm, 0, row)[column] = (float)weave_height(x, y, &warp);
     const double gx = (weave_height(x + d, y, &ignored) - weave_height(x - d, y, &ignored)) / (2 * d);
     const double gy = (weave_height(x, y + d, &ignored) - weave_height(x, y - d, &ignored)) / (2 * d);
     const double length = sqrt(gx * gx + gy * gy + 1), normal[3] = {-gx / length, -gy / length, 1 / length};
@@ -58,6 +58,7 @@ int main(int argc, char **argv)
     maps.origin_mm[1] = (HEIGHT - 1) / 2.0 * MM_PER_PX;
     weft_err status = weft_image_init(&maps.normal, WIDTH, HEIGHT, 3, &error);
     status = status == WEFT_OK ? weft_image_init(&maps.albedo, WIDTH, HEIGHT, 3, &error) : status;
+    status = status == WEFT_OK ? weft_image_init(&maps.height_mm, WIDTH, HEIGHT, 1, &error) : status;
     status = status == WEFT_OK ? weft_image_init(&maps.residual, WIDTH, HEIGHT, 1, &error) : status;
     status = status == WEFT_OK ? weft_image_init(&maps.confidence, WIDTH, HEIGHT, 1, &error) : status;
     status = status == WEFT_OK ? weft_mask_init(&maps.mask, WIDTH, HEIGHT, 255, &error) : status;

@@ -94,6 +94,21 @@ expect 2 '"lamps" with some' "$weft" preview -o x.png --columns lamps
 expect 1 'no/such.exr' "$weft" preview -o x.png --env no/such.exr
 expect 2 'wants the INPUT' "$weft" preview -o x.png --match small.set -c x.cal
 
+# shadows of the relief and of folds
+expect 0 'lit.exr' "$weft" preview weave.maps -o lit.exr --light 20,15 --size 200x150
+expect 0 'dark.exr' "$weft" preview weave.maps -o dark.exr --light 20,15 --size 200x150 --self-shadow
+! cmp -s lit.exr dark.exr
+expect 0 'coarse.png' "$weft" preview weave.maps -o coarse.png --shape sphere --size 60x60 --self-shadow --shadow-steps 4 --shadow-blur always
+expect 0 'folds.png' "$weft" preview weave.maps -o folds.png --shape drape --size 60x60 --folds marched --voxels 64 --lamp ball:-40,40,60,9
+expect 0 'walked.png' "$weft" preview weave.maps -o walked.png --shape drape --size 60x60 --folds walked --self-shadow --height-map weave.maps/height.exr
+rm weave.maps/height.exr
+expect 1 'solve with --height poisson' "$weft" preview weave.maps -o x.png --self-shadow
+expect 1 '3 planes; heights are one' "$weft" preview weave.maps -o x.png --self-shadow --height-map weave.maps/albedo.exr
+"$weft" preview -q -o small.exr --size 8x8 >/dev/null && expect 1 '3 planes' "$weft" preview weave.maps -o x.png --self-shadow --height-map small.exr
+expect 1 'nothing.exr' "$weft" preview weave.maps -o x.png --self-shadow --height-map nothing.exr
+expect 2 'wants --self-shadow' "$weft" preview weave.maps -o x.png --height-map x.exr
+expect 2 'neither --match nor' "$weft" preview weave.maps -o x.png --self-shadow --columns alpha=1
+
 # light from the left brightens the left flanks: the picture under 180,30 and under 0,30 must differ, and the
 # same command must give the same bytes
 "$weft" preview -q weave.maps -o a.png --light 180,30 >/dev/null
