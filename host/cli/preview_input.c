@@ -68,10 +68,18 @@ static const struct {
     const char *param;
     weft_baked_kind kind;
 } material_params[] = {
-    {"albedo", WEFT_BAKED_ALBEDO},         {"base", WEFT_BAKED_ALBEDO},
-    {"f0", WEFT_BAKED_SPECULAR},           {"alpha", WEFT_BAKED_ROUGHNESS},
-    {"anisotropy", WEFT_BAKED_ANISOTROPY}, {"front", WEFT_BAKED_FRONT_TINT},
-    {"rim", WEFT_BAKED_RIM_TINT},          {"amplitude", WEFT_BAKED_RIM_AMPLITUDE},
+    {"albedo", WEFT_BAKED_ALBEDO},
+    {"base", WEFT_BAKED_ALBEDO},
+    {"f0", WEFT_BAKED_SPECULAR},
+    {"alpha", WEFT_BAKED_ROUGHNESS},
+    {"anisotropy", WEFT_BAKED_ANISOTROPY},
+    {"front", WEFT_BAKED_FRONT_TINT},
+    {"rim", WEFT_BAKED_RIM_TINT},
+    {"amplitude", WEFT_BAKED_RIM_AMPLITUDE},
+    {"cloth", WEFT_BAKED_CLOTH},
+    {"cloth_albedo", WEFT_BAKED_CLOTH_ALBEDO},
+    {"cloth_f0", WEFT_BAKED_CLOTH_SPECULAR},
+    {"cloth_alpha", WEFT_BAKED_CLOTH_ROUGHNESS},
 };
 
 static void use_material_map(weft_preview_surface *surface, const char *param, const weft_baked_map *map,
@@ -79,7 +87,7 @@ static void use_material_map(weft_preview_surface *surface, const char *param, c
 {
     int plane = 0;
     const weft_brdf_param *const row = weft_brdf_find_param(surface->brdf, param, &plane);
-    if (!row || (row->components == 1 && planes == 3 && strcmp(param, "f0") != 0))
+    if (!row || (row->components == 1 && planes == 3 && !strstr(param, "f0")))
         return;
     for (int c = 0; c < row->components; c++) {
         const double value = (double)map->constant[planes == 3 ? c : 0];

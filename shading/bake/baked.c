@@ -33,6 +33,11 @@ const weft_baked_row weft_baked_rows[WEFT_BAKED_COUNT] = {
     [WEFT_BAKED_DETAIL_ALBEDO] = {"detail_albedo", 3, {1, 1, 1}, "", {"R", "G", "B"}, "albedo over its base"},
     [WEFT_BAKED_DETAIL_NORMAL] =
         {"detail_normal", 3, {0, 0, 1}, "", {"X", "Y", "Z"}, "normal without its base"},
+    [WEFT_BAKED_CLOTH_ALBEDO] =
+        {"cloth_albedo", 3, {0.5F, 0.5F, 0.5F}, "", {"R", "G", "B"}, "diffuse reflectance of the cloth part"},
+    [WEFT_BAKED_CLOTH_SPECULAR] =
+        {"cloth_specular", 3, {0.04F, 0.04F, 0.04F}, "", {"R", "G", "B"}, "F0 of the cloth part"},
+    [WEFT_BAKED_CLOTH_ROUGHNESS] = {"cloth_roughness", 1, {0.5F}, "", {"Y"}, "alpha of the cloth part"},
 };
 
 weft_err weft_baked_init(weft_baked *baked, const char *name, const weft_material_type *type, weft_error *err)
@@ -82,6 +87,21 @@ weft_err weft_baked_add(weft_baked *baked, weft_baked_kind kind, int width, int 
     baked->width = width;
     baked->height = height;
     return WEFT_OK;
+}
+
+weft_baked_kind weft_baked_of_cloth(const weft_baked *baked, weft_baked_kind kind)
+{
+    if (!baked->two_lobes)
+        return kind;
+    return kind == WEFT_BAKED_ALBEDO      ? WEFT_BAKED_CLOTH_ALBEDO
+           : kind == WEFT_BAKED_SPECULAR  ? WEFT_BAKED_CLOTH_SPECULAR
+           : kind == WEFT_BAKED_ROUGHNESS ? WEFT_BAKED_CLOTH_ROUGHNESS
+                                          : kind;
+}
+
+const char *weft_baked_brdf(const weft_baked *baked)
+{
+    return baked->two_lobes ? "ggx-cloth" : baked->type->brdf;
 }
 
 weft_baked_kind weft_baked_find(const char *name)

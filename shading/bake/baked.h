@@ -36,6 +36,10 @@ typedef enum weft_baked_kind {
     WEFT_BAKED_RIM_AMPLITUDE, /* 1: 0..4 */
     WEFT_BAKED_DETAIL_ALBEDO, /* 3: albedo divided by its base (its low frequencies), about 1 */
     WEFT_BAKED_DETAIL_NORMAL, /* 3: unit normal with the base's slopes taken out */
+    /* of the cloth part where `two_lobes`, as the rows without "cloth" are then of the GGX part */
+    WEFT_BAKED_CLOTH_ALBEDO,    /* 3 */
+    WEFT_BAKED_CLOTH_SPECULAR,  /* 3 */
+    WEFT_BAKED_CLOTH_ROUGHNESS, /* 1 */
     WEFT_BAKED_COUNT
 } weft_baked_kind;
 
@@ -64,8 +68,10 @@ typedef struct weft_baked {
     double size_mm[2];              /* across and up; 0: unknown */
     bool periodic;                  /* the right edge continues at the left, the top at the bottom */
     bool enable_diffuse, enable_specular;
+    bool two_lobes; /* GGX and cloth side by side, each with parameters of its own (S-ORD-26); else those of
+                       the one lobe are in the rows without "cloth" */
     weft_baked_map maps[WEFT_BAKED_COUNT];
-    char *u3m;                      /* path of the U3M that it is made from; NULL: from none */
+    char *u3m;          /* path of the U3M that it is made from; NULL: from none */
     json_t *provenance; /* inputs with hashes, options, version: goes into reports; may be NULL */
 } weft_baked;
 
@@ -81,6 +87,13 @@ int weft_baked_levels(int width, int height);
 /** Gives a map its level 0, zeroed (the other levels are the baker's); the first sets width and height.
  *  @return WEFT_ERR_MISMATCH when the size is another than that of the maps there are; WEFT_ERR_NOMEM */
 weft_err weft_baked_add(weft_baked *baked, weft_baked_kind kind, int width, int height, weft_error *err);
+
+/** The row of the cloth lobe that answers to one of albedo, specular, roughness; the kind itself for others
+ * and where there is one lobe. */
+weft_baked_kind weft_baked_of_cloth(const weft_baked *baked, weft_baked_kind kind);
+
+/** The reflectance model that shows the material. */
+const char *weft_baked_brdf(const weft_baked *baked);
 
 /** The kind of a name ("albedo"), or WEFT_BAKED_COUNT. */
 weft_baked_kind weft_baked_find(const char *name);

@@ -438,9 +438,29 @@ static weft_err filter_level(weft_baked *baked, int level, const weft_mip_option
     return weft_parallel_rows_progress(rows, normal_rows, &job, "mips", err);
 }
 
-static bool is_filtered(weft_baked_kind kind)
+static bool is_filtered(const weft_baked *baked, weft_baked_kind kind)
 {
-    return kind == WEFT_BAKED_NORMAL || kind == WEFT_BAKED_NORMAL_LENGTH || kind == WEFT_BAKED_ROUGHNESS;
+    return (kind == WEFT_BAKED_CLOTH_ROUGHNESS && baked->two_lobes) || kind == WEFT_BAKED_NORMAL ||
+           kind == WEFT_BAKED_NORMAL_LENGTH || kind == WEFT_BAKED_ROUGHNESS;
+}
+
+static void swap_lobes(weft_baked *baked)
+{
+    const weft_baked_map cloth = baked->maps[WEFT_BAKED_CLOTH_ROUGHNESS];
+    baked->maps[WEFT_BAKED_CLOTH_ROUGHNESS] = baked->maps[WEFT_BAKED_ROUGHNESS];
+    baked->maps[WEFT_BAKED_ROUGHNESS] = cloth;
+}
+
+/* The cloth part's roughness answers for the same normals as that of the GGX part. */
+static weft_err filter_cloth(weft_baked *baked, int levels, const weft_mip_options *options, float *scratch,
+                             weft_error *err)
+{
+    swap_lobes(baked);
+    weft_err status = spread_roughness(baked, err);
+    for (int level = 1; level < levels && status == WEFT_OK; level++)
+        status = filter_level(baked, level, options, scratch, err);
+    swap_lobes(baked);
+    return status;
 }
 
 static void note_means(weft_baked *baked)
@@ -478,11 +498,13 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
     for (int level = 1; level < levels && status == WEFT_OK; level++) {
         for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK;
              k++) /* anisotropy before the lobe needs it */
-            if (baked->maps[k].n_mips > 0 && !(bumpy && is_filtered((weft_baked_kind)k)))
+            if (baked->maps[k].n_mips > 0 && !(bumpy && is_filtered(baked, (weft_baked_kind)k)))
                 status = average_level(baked, (weft_baked_kind)k, level, options, err);
         if (status == WEFT_OK && bumpy)
             status = filter_level(baked, level, options, scratch, err);
     }
+    if (status == WEFT_OK && bumpy && baked->two_lobes)
+        status = filter_cloth(baked, levels, options, scratch, err);
     for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK; k++)
         if (baked->maps[k].n_mips > 0)
             baked->maps[k].n_mips = levels;

@@ -26,8 +26,8 @@ typedef struct weft_weave {
 
 void weft_weave_fini(weft_weave *weave);
 
-/** Where in the picture the cloth lies that would be at `even` if all threads lay on the lattice: pixels, right
- *  and down. */
+/** Where in the picture the cloth lies that would be at `even` if all threads lay on the lattice: pixels,
+ * right and down. */
 void weft_weave_place(const weft_weave *weave, const double even[2], double at[2]);
 
 /**

@@ -20,7 +20,7 @@
 #include <stdio.h>
 
 /** Planes of all parameters of a model: a colour takes three. */
-#define WEFT_BRDF_MAX_PLANES 16
+#define WEFT_BRDF_MAX_PLANES 20
 
 /** A row of a model's parameters; the table ends with {0}. */
 typedef struct weft_brdf_param {

@@ -69,6 +69,7 @@ WEFT_BRDF_KERNEL(unreal)
 WEFT_BRDF_KERNEL(disney)
 WEFT_BRDF_KERNEL(cloth)
 WEFT_BRDF_KERNEL(cloth_two_tone)
+WEFT_BRDF_KERNEL(ggx_cloth)
 WEFT_BRDF_KERNEL(charlie)
 
 #endif

@@ -14,6 +14,7 @@ typedef enum coding {
     CODE_SMOOTH,
     CODE_HEIGHT,
     CODE_BASE,
+    CODE_REST,
     CODE_METALLIC,
     CODE_CONSTANT
 } coding;
@@ -55,6 +56,7 @@ static const channel channels[] = {
     {"cavity", WEFT_BAKED_CAVITY, 0, CODE_PLAIN, 0},
     {"opacity", WEFT_BAKED_OPACITY, 0, CODE_PLAIN, 0},
     {"cloth", WEFT_BAKED_CLOTH, 0, CODE_PLAIN, 0},
+    {"smooth", WEFT_BAKED_CLOTH, 0, CODE_REST, 0},
     {"front.r", WEFT_BAKED_FRONT_TINT, 0, CODE_PLAIN, 0},
     {"front.g", WEFT_BAKED_FRONT_TINT, 1, CODE_PLAIN, 0},
     {"front.b", WEFT_BAKED_FRONT_TINT, 2, CODE_PLAIN, 0},
@@ -79,12 +81,23 @@ bool weft_channel_known(const char *name)
     return find(name) != NULL;
 }
 
-static double value_at(const weft_baked *b, weft_baked_kind kind, int plane, int level, size_t i)
+static double row_at(const weft_baked *b, weft_baked_kind kind, int plane, int level, size_t i)
 {
     const weft_baked_map *const map = &b->maps[kind];
     if (level >= 0 && level < map->n_mips && map->mips[level].data)
         return (double)weft_image_plane(&map->mips[level], plane)[i];
     return (double)map->constant[plane];
+}
+
+/* Where GGX and cloth lie side by side, formats have one diffuse colour for both: what is seen of them
+ * together. */
+static double value_at(const weft_baked *b, weft_baked_kind kind, int plane, int level, size_t i)
+{
+    const double value = row_at(b, kind, plane, level, i);
+    if (kind != WEFT_BAKED_ALBEDO || !b->two_lobes)
+        return value;
+    const double share = row_at(b, WEFT_BAKED_CLOTH, 0, level, i);
+    return value + share * (row_at(b, WEFT_BAKED_CLOTH_ALBEDO, plane, level, i) - value);
 }
 
 /* How much of the surface is metal: nothing diffuse, and an F0 that no dielectric has. */
@@ -113,6 +126,8 @@ static double coded(const weft_baked *b, const channel *c, int level, size_t i, 
         return 0.5 - 0.5 * v;
     case CODE_ROOT:
         return sqrt(fmax(v, 0));
+    case CODE_REST:
+        return 1 - v;
     case CODE_SMOOTH:
         return 1 - sqrt(fmax(v, 0));
     case CODE_HEIGHT:
@@ -151,6 +166,9 @@ bool weft_channel_varies(const weft_baked *baked, const char *name)
     if (c->code == CODE_METALLIC)
         return false; /* a material is metal or not, as a whole; a mix goes into the base colour */
     if (c->code == CODE_BASE && baked->maps[WEFT_BAKED_SPECULAR].n_mips > 0 && metallic_at(baked, -1, 0) > 0)
+        return true;
+    if (c->kind == WEFT_BAKED_ALBEDO && baked->two_lobes &&
+        (baked->maps[WEFT_BAKED_CLOTH].n_mips > 0 || baked->maps[WEFT_BAKED_CLOTH_ALBEDO].n_mips > 0))
         return true;
     return baked->maps[c->kind].n_mips > 0;
 }

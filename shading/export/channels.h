@@ -1,12 +1,14 @@
 /**
  * Channels of exported pictures by name: what packing presets are written in.
  *
- *     albedo.r albedo.g albedo.b         diffuse reflectance (coded as sRGB where the picture is colour)
+ *     albedo.r albedo.g albedo.b         diffuse reflectance (coded as sRGB where the picture is colour);
+ *                                        of GGX and cloth side by side that of both together
  *     base.r base.g base.b               base colour of metallic models: albedo, or F0 of metals
  *     metallic                           1 where there is no diffuse part and F0 is a metal's
  *     roughness, smoothness, alpha       sqrt(alpha), 1 - sqrt(alpha), alpha of the lobe
  *     normal.x normal.y normal.z         0.5 + 0.5 n; -normal.y for green down
  *     height                             0..1 over the range of the map
+ *     smooth                             1 - cloth
  *     occlusion cavity opacity cloth specular.r ... front.r ... rim.r ... detail_normal.x ... detail_albedo.r
  * ... zero half one                      constants
  */

@@ -200,20 +200,29 @@ static weft_err add_normal(glb *g, json_t *material, weft_error *err)
 
 /* F0 of the dielectric is 0.04 times the factor times the colour; a cloth has its lobe in the sheen instead.
  */
-static void add_specular(glb *g, json_t *extensions)
+static weft_err add_specular(glb *g, json_t *extensions, weft_error *err)
 {
+    static const weft_channels channels = {{"one", "one", "one", "smooth"}, 8, false};
     double colour[3];
+    const bool varies = weft_channel_varies(g->baked, "cloth");
     const double cloth = (double)g->baked->maps[WEFT_BAKED_CLOTH].constant[0];
     for (int p = 0; p < 3; p++)
         colour[p] = (double)g->baked->maps[WEFT_BAKED_SPECULAR].constant[p] / 0.04;
     if (!(cloth > 0) && fabs(colour[0] - 1) < 1e-3 && fabs(colour[1] - 1) < 1e-3 &&
         fabs(colour[2] - 1) < 1e-3)
-        return;
-    json_object_set_new(extensions, "KHR_materials_specular",
-                        json_pack("{s:f, s:o}", "specularFactor", fmin(fmax(1 - cloth, 0), 1),
-                                  "specularColorFactor", numbers(colour, 3)));
+        return WEFT_OK;
+    json_t *const specular =
+        json_pack("{s:f, s:o}", "specularFactor", varies ? 1 : fmin(fmax(1 - cloth, 0), 1),
+                  "specularColorFactor", numbers(colour, 3));
+    json_object_set_new(extensions, "KHR_materials_specular", specular);
+    if (varies) {
+        int index;
+        WEFT_TRY(add_picture(g, "specular", &channels, &index, err));
+        json_object_set_new(specular, "specularTexture", texture(index));
+    }
     if (g->baked->maps[WEFT_BAKED_SPECULAR].n_mips > 0)
         weft_export_lose(g->job, "specular: F0 varies over the material; its mean is written");
+    return WEFT_OK;
 }
 
 static void add_anisotropy(glb *g, json_t *extensions)
@@ -265,46 +274,67 @@ static weft_err lobe_albedo(const char *name, double alpha, double amplitude, do
     return WEFT_OK;
 }
 
-/* glTF has no cloth of The Order: the Charlie sheen whose directional albedo is nearest by least squares. */
-static weft_err add_sheen(glb *g, json_t *extensions, weft_error *err)
+/* The Charlie sheen whose directional albedo is nearest to the cloth lobe's by least squares. */
+static weft_err nearest_sheen(double cloth_alpha, double amplitude, double *width, double *scale,
+                              double *left, weft_error *err)
 {
-    const weft_baked *const b = g->baked;
-    const double cloth = (double)b->maps[WEFT_BAKED_CLOTH].constant[0];
-    double wanted[VIEWS], best = INFINITY, width = 0.5, scale = 0, norm = 0;
-    if (!(cloth > 0))
-        return WEFT_OK;
-    WEFT_TRY(lobe_albedo("cloth", (double)b->maps[WEFT_BAKED_ROUGHNESS].constant[0],
-                         (double)b->maps[WEFT_BAKED_RIM_AMPLITUDE].constant[0], wanted, err));
+    double wanted[VIEWS], norm = 0, best = INFINITY;
+    WEFT_TRY(lobe_albedo("cloth", cloth_alpha, amplitude, wanted, err));
     for (int k = 0; k < VIEWS; k++)
         norm += wanted[k] * wanted[k];
     for (int step = 0; step < WIDTHS; step++) {
         const double alpha = 0.1 + 0.9 * step / (WIDTHS - 1);
-        double sheen[VIEWS], both = 0, self = 0, left = 0;
+        double sheen[VIEWS], both = 0, self = 0, rest = 0;
         WEFT_TRY(lobe_albedo("charlie", alpha, 0, sheen, err));
         for (int k = 0; k < VIEWS; k++) {
             both += wanted[k] * sheen[k];
             self += sheen[k] * sheen[k];
         }
         for (int k = 0; k < VIEWS; k++)
-            left += pow(wanted[k] - both / self * sheen[k], 2);
-        if (left < best) {
-            best = left;
-            width = alpha;
-            scale = both / self;
+            rest += pow(wanted[k] - both / self * sheen[k], 2);
+        if (rest < best) {
+            best = rest;
+            *width = alpha;
+            *scale = both / self;
         }
     }
-    double colour[3];
+    *left = sqrt(best / norm);
+    return WEFT_OK;
+}
+
+/* glTF has no cloth of The Order; where the share of cloth varies, so does the sheen. */
+static weft_err add_sheen(glb *g, json_t *extensions, weft_error *err)
+{
+    static const weft_channels channels = {{"cloth", "cloth", "cloth", NULL}, 8, true};
+    const weft_baked *const b = g->baked;
+    const bool varies = weft_channel_varies(b, "cloth");
+    const double cloth = varies ? 1 : (double)b->maps[WEFT_BAKED_CLOTH].constant[0];
+    double width = 0.5, scale = 0, left = 0, colour[3];
+    if (!(cloth > 0))
+        return WEFT_OK;
+    WEFT_TRY(nearest_sheen((double)b->maps[weft_baked_of_cloth(b, WEFT_BAKED_ROUGHNESS)].constant[0],
+                           (double)b->maps[WEFT_BAKED_RIM_AMPLITUDE].constant[0], &width, &scale, &left,
+                           err));
     for (int p = 0; p < 3; p++)
-        colour[p] = fmin(cloth * scale * (double)b->maps[WEFT_BAKED_SPECULAR].constant[p] *
-                             (double)b->maps[WEFT_BAKED_RIM_TINT].constant[p],
-                         1);
-    json_object_set_new(
-        extensions, "KHR_materials_sheen",
-        json_pack("{s:o, s:f}", "sheenColorFactor", numbers(colour, 3), "sheenRoughnessFactor", sqrt(width)));
+        colour[p] =
+            fmin(cloth * scale * (double)b->maps[weft_baked_of_cloth(b, WEFT_BAKED_SPECULAR)].constant[p] *
+                     (double)b->maps[WEFT_BAKED_RIM_TINT].constant[p],
+                 1);
+    json_t *const sheen =
+        json_pack("{s:o, s:f}", "sheenColorFactor", numbers(colour, 3), "sheenRoughnessFactor", sqrt(width));
+    json_object_set_new(extensions, "KHR_materials_sheen", sheen);
+    if (varies) {
+        int index;
+        WEFT_TRY(add_picture(g, "sheenColor", &channels, &index, err));
+        json_object_set_new(sheen, "sheenColorTexture", texture(index));
+    }
     weft_export_lose(
         g->job,
         "cloth lobe: written as the nearest sheen, which leaves %.0f %% rms of its directional albedo",
-        100 * sqrt(best / norm));
+        100 * left);
+    if (b->two_lobes)
+        weft_export_lose(g->job,
+                         "two lobes: glTF lays sheen over one surface; its colour is that of both together");
     return WEFT_OK;
 }
 
@@ -322,7 +352,8 @@ static weft_err add_material(glb *g, weft_error *err)
         status = add_normal(g, material, err);
     if (status == WEFT_OK)
         status = add_sheen(g, extensions, err);
-    add_specular(g, extensions);
+    if (status == WEFT_OK)
+        status = add_specular(g, extensions, err);
     add_anisotropy(g, extensions);
     json_t *const used = json_array();
     const char *name;
@@ -332,9 +363,9 @@ static weft_err add_material(glb *g, weft_error *err)
         json_object_set(material, "extensions", extensions);
         json_object_set(g->root, "extensionsUsed", used);
     }
-    json_object_set_new(
-        material, "extras",
-        json_pack("{s:o, s:s}", "size_mm", numbers(g->baked->size_mm, 2), "model", g->baked->type->brdf));
+    json_object_set_new(material, "extras",
+                        json_pack("{s:o, s:s}", "size_mm", numbers(g->baked->size_mm, 2), "model",
+                                  weft_baked_brdf(g->baked)));
     json_decref(used);
     json_decref(extensions);
     return status;
@@ -414,6 +445,6 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 const weft_exporter weft_exporter_gltf = {
     .name = "gltf",
     .summary = "a .glb: a swatch of true size with sheen, anisotropy and specular extensions",
-    .version = 1,
+    .version = 2,
     .write = write,
 };

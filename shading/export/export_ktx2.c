@@ -151,6 +151,8 @@ static weft_err write(const weft_export_job *job, weft_error *err)
     weft_export_lose(
         job, "glTF: KHR_texture_basisu wants Basis compression, so these stand beside the .glb, not in it");
     weft_export_lose(job, "cloth lobe, anisotropy, height: not in these textures");
+    if (job->baked->two_lobes)
+        weft_export_lose(job, "two lobes: roughness is the smooth part's, the colour is that of both");
     return WEFT_OK;
 }
 

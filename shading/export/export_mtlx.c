@@ -77,7 +77,7 @@ static weft_err add_surface(mtlx *m, weft_error *err)
 {
     static const weft_channels base = {{"base.r", "base.g", "base.b", NULL}, 8, true};
     static const weft_channels rough = {{"roughness", NULL}, 16, false},
-                               opacity = {{"opacity", NULL}, 8, false};
+                               opacity = {{"opacity", NULL}, 8, false}, cloth = {{"cloth", NULL}, 8, false};
     const weft_baked *const b = m->baked;
     char text[96];
     double roughness, anisotropy;
@@ -95,7 +95,10 @@ static weft_err add_surface(mtlx *m, weft_error *err)
     (void)snprintf(text, sizeof text, "%.6g", (1 + root) / (1 - root));
     WEFT_TRY(add_input(m, "specular_ior", "float", NULL, text, err));
     (void)snprintf(text, sizeof text, "%.6g", (double)b->maps[WEFT_BAKED_CLOTH].constant[0]);
-    WEFT_TRY(add_input(m, "fuzz_weight", "float", NULL, text, err));
+    WEFT_TRY(add_input(m, "fuzz_weight", "float", &cloth, text, err));
+    (void)snprintf(text, sizeof text, "%.6g",
+                   sqrt((double)b->maps[weft_baked_of_cloth(b, WEFT_BAKED_ROUGHNESS)].constant[0]));
+    WEFT_TRY(add_input(m, "fuzz_roughness", "float", NULL, text, err));
     (void)snprintf(text, sizeof text, "%.6g, %.6g, %.6g", (double)b->maps[WEFT_BAKED_RIM_TINT].constant[0],
                    (double)b->maps[WEFT_BAKED_RIM_TINT].constant[1],
                    (double)b->maps[WEFT_BAKED_RIM_TINT].constant[2]);
@@ -143,6 +146,8 @@ static weft_err write(const weft_export_job *job, weft_error *err)
     weft_text_buffer_fini(&m.nodes);
     weft_text_buffer_fini(&m.inputs);
     weft_export_lose(job, "cloth lobe: written as fuzz, whose shape is another");
+    if (job->baked->two_lobes)
+        weft_export_lose(job, "two lobes: fuzz lies over one surface; its colour is that of both together");
     weft_export_lose(job, "height: not connected, OpenPBR has no displacement; height.exr has millimetres");
     weft_export_lose(job, "mips: PNG has one level");
     return status;
@@ -151,6 +156,6 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 const weft_exporter weft_exporter_mtlx = {
     .name = "mtlx",
     .summary = "MaterialX 1.39 with an OpenPBR surface",
-    .version = 1,
+    .version = 2,
     .write = write,
 };

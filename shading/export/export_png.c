@@ -23,6 +23,9 @@ static const coding codings[] = {
     {WEFT_BAKED_CAVITY, WEFT_TRANSFER_LINEAR, 8, 1, 0},
     {WEFT_BAKED_OPACITY, WEFT_TRANSFER_LINEAR, 8, 1, 0},
     {WEFT_BAKED_CLOTH, WEFT_TRANSFER_LINEAR, 8, 1, 0},
+    {WEFT_BAKED_CLOTH_ALBEDO, WEFT_TRANSFER_SRGB, 8, 1, 0},
+    {WEFT_BAKED_CLOTH_SPECULAR, WEFT_TRANSFER_LINEAR, 16, 1, 0},
+    {WEFT_BAKED_CLOTH_ROUGHNESS, WEFT_TRANSFER_LINEAR, 16, 1, 0},
 };
 
 static weft_err write_map(const weft_export_job *job, const coding *c, const weft_image *level,

@@ -69,6 +69,9 @@ static void say_what_is_lost(const weft_export_job *job, const json_t *preset)
     if ((double)job->baked->maps[WEFT_BAKED_CLOTH].constant[0] > 0)
         json_array_foreach(json_object_get(preset, "lost"), i, sentence)
             json_array_append(job->lost, sentence);
+    if (job->baked->two_lobes)
+        weft_export_lose(job,
+                         "two lobes: roughness and F0 are the smooth part's, the colour is that of both");
     weft_channels_height_range(job->baked, range_mm);
     if (range_mm[1] > range_mm[0])
         weft_export_lose(job, "height: 0 is %.6g mm and white %.6g mm; the engine has to be told",

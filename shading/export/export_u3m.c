@@ -215,7 +215,6 @@ static void add_numbers(const u3m *u, json_t *side, double anisotropy)
         {"anisotropy_rotation", turn / (2 * acos(-1)) - floor(turn / (2 * acos(-1)))},
         {"specular_value", clamp(f0 / 0.08)},
         {"ior", (1 + sqrt(f0)) / (1 - fmin(sqrt(f0), 0.99))}, /* the same F0 twice: readers use either */
-        {"sheen_value", (double)b->maps[WEFT_BAKED_CLOTH].constant[0]},
         {"sheen_tint", 0},
         {"specular_tint", 0},
         {"clearcoat_value", 0},
@@ -244,6 +243,7 @@ static weft_err add_side(u3m *u, json_t *side, weft_error *err)
     WEFT_TRY(
         add_scalar(u, side, "roughness", "roughness", roughness, pow(1 - 0.9 * anisotropy, 0.25), 0, err));
     WEFT_TRY(add_scalar(u, side, "displacement", "height", 0, range_mm[1] - range_mm[0], range_mm[0], err));
+    WEFT_TRY(add_scalar(u, side, "sheen_value", "cloth", weft_channel_mean(b, "cloth"), 1, 0, err));
     add_numbers(u, side, anisotropy);
     if (!u->keep.source) {
         json_object_set_new(side, "shader", json_string("principled"));
@@ -258,8 +258,8 @@ static json_t *own_section(const weft_baked *b)
     double range_mm[2];
     weft_channels_height_range(b, range_mm);
     return json_pack("{s:s, s:s, s:[f,f], s:f, s:f, s:[f,f], s:[f,f,f], s:[f,f,f], s:f}", "version",
-                     WEFT_VERSION, "model", b->type->brdf, "size_mm", b->size_mm[0], b->size_mm[1], "alpha",
-                     (double)b->maps[WEFT_BAKED_ROUGHNESS].constant[0], "anisotropy",
+                     WEFT_VERSION, "model", weft_baked_brdf(b), "size_mm", b->size_mm[0], b->size_mm[1],
+                     "alpha", (double)b->maps[WEFT_BAKED_ROUGHNESS].constant[0], "anisotropy",
                      (double)b->maps[WEFT_BAKED_ANISOTROPY].constant[0], "height_mm", range_mm[0],
                      range_mm[1], "front_tint", (double)b->maps[WEFT_BAKED_FRONT_TINT].constant[0],
                      (double)b->maps[WEFT_BAKED_FRONT_TINT].constant[1],
@@ -403,6 +403,9 @@ static void say_what_is_lost(const weft_export_job *job)
             job, "cloth lobe: sheen_value is its weight; U3M's sheen has no width and no tint of its own");
     weft_export_lose(
         job, "displacement: in millimetres, which U3M does not say; custom.weft.height_mm repeats the range");
+    if (b->two_lobes)
+        weft_export_lose(job,
+                         "two lobes: roughness and F0 are the smooth part's, the colour is that of both");
     weft_export_lose(job, "occlusion, cavity, curvature, bent cones, mips: U3M has no place for them");
     if (b->maps[WEFT_BAKED_ANISOTROPY].n_mips > 0 || b->maps[WEFT_BAKED_TANGENT].n_mips > 0)
         weft_export_lose(job, "anisotropy: its strength or direction varies; the mean is written");
@@ -439,6 +442,6 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 const weft_exporter weft_exporter_u3m = {
     .name = "u3m",
     .summary = "U3M 1.1 for textile programs, as .u3m with pictures and as one .u3ma",
-    .version = 2,
+    .version = 3,
     .write = write,
 };

@@ -18,7 +18,7 @@
 #include <string.h>
 
 /* Raised when the code of a step changes what it makes. */
-enum { COMPOSITE_VERSION = 1, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
+enum { COMPOSITE_VERSION = 2, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
 
 enum { CAVITY_RADIUS_PX = 8 };
 
@@ -389,20 +389,22 @@ static weft_err make_detail(builder *b, weft_error *err)
 
 /* -- files -------------------------------------------------------------------------------------------- */
 
-static bool is_lobe(weft_baked_kind kind)
+static bool is_lobe(const builder *b, weft_baked_kind kind)
 {
-    return kind == WEFT_BAKED_NORMAL || kind == WEFT_BAKED_ROUGHNESS || kind == WEFT_BAKED_ANISOTROPY ||
-           kind == WEFT_BAKED_NORMAL_LENGTH;
+    return (kind == WEFT_BAKED_CLOTH_ROUGHNESS && b->baked.two_lobes) || kind == WEFT_BAKED_NORMAL ||
+           kind == WEFT_BAKED_ROUGHNESS || kind == WEFT_BAKED_ANISOTROPY || kind == WEFT_BAKED_NORMAL_LENGTH;
 }
 
 /* Normals and roughness are filtered together: their files have one key. */
 static void key_file(const builder *b, weft_baked_kind kind, char hex[65])
 {
     weft_build_key key = weft_build_key_begin(weft_baked_rows[kind].name, FILE_VERSION);
-    if (is_lobe(kind)) {
+    if (is_lobe(b, kind)) {
         weft_build_key_text(&key, "normal", b->texels[WEFT_BAKED_NORMAL]);
         weft_build_key_text(&key, "roughness", b->texels[WEFT_BAKED_ROUGHNESS]);
         weft_build_key_text(&key, "anisotropy", b->texels[WEFT_BAKED_ANISOTROPY]);
+        if (b->baked.two_lobes)
+            weft_build_key_text(&key, "cloth_roughness", b->texels[WEFT_BAKED_CLOTH_ROUGHNESS]);
         weft_build_key_number(&key, "rule", b->options->mips.rule);
     } else {
         weft_build_key_text(&key, "texels", b->texels[kind]);
@@ -444,17 +446,17 @@ static weft_err write_maps(builder *b, weft_error *err)
     const bool bumpy = baked->maps[WEFT_BAKED_NORMAL].n_mips > 0;
     for (int k = 0; k < WEFT_BAKED_COUNT; k++) {
         const weft_baked_kind kind = (weft_baked_kind)k;
-        const bool wanted = baked->maps[k].n_mips > 0 ||
-                            (bumpy && (kind == WEFT_BAKED_ROUGHNESS || kind == WEFT_BAKED_NORMAL_LENGTH));
+        const bool wanted =
+            baked->maps[k].n_mips > 0 || (bumpy && is_lobe(b, kind) && kind != WEFT_BAKED_ANISOTROPY);
         key_file(b, kind, keys[k]);
         stale[k] = wanted && !(is_current(b, weft_baked_rows[k].name, keys[k]) && file_is_there(b, kind));
-        lobe_stale = lobe_stale || (stale[k] && is_lobe(kind));
+        lobe_stale = lobe_stale || (stale[k] && is_lobe(b, kind));
     }
     const int levels = weft_baked_levels(baked->width, baked->height);
     for (int k = 0; k < WEFT_BAKED_COUNT; k++) { /* what is current needs no texels any more */
         const weft_baked_kind kind = (weft_baked_kind)k;
-        stale[k] = stale[k] || (is_lobe(kind) && lobe_stale && bumpy && baked->maps[k].n_mips > 0);
-        if (!stale[k] && !(is_lobe(kind) && lobe_stale)) {
+        stale[k] = stale[k] || (is_lobe(b, kind) && lobe_stale && bumpy && baked->maps[k].n_mips > 0);
+        if (!stale[k] && !(is_lobe(b, kind) && lobe_stale)) {
             drop(baked, kind);
             recall_mean(b, kind);
             b->result->kept += baked->maps[k].n_mips > 0;
@@ -476,7 +478,7 @@ static weft_err write_maps(builder *b, weft_error *err)
         const weft_baked_kind kind = (weft_baked_kind)k;
         if (!baked->maps[k].mips[0].data) {
             baked->maps[k].n_mips =
-                had[k] || (bumpy && is_lobe(kind) && kind != WEFT_BAKED_ANISOTROPY) ? levels : 0;
+                had[k] || (bumpy && is_lobe(b, kind) && kind != WEFT_BAKED_ANISOTROPY) ? levels : 0;
             continue;
         }
         note(b, weft_baked_rows[k].name, "rebuilt", "its texels changed");

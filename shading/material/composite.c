@@ -264,6 +264,8 @@ static void set_constant(weft_baked *baked, weft_baked_kind kind, int planes, co
     drop_map(baked, kind);
     for (int p = 0; p < weft_baked_rows[kind].planes; p++)
         baked->maps[kind].constant[p] = (float)values[planes == 1 ? 0 : p];
+    if (weft_baked_of_cloth(baked, kind) != kind) /* what is set holds for both parts */
+        set_constant(baked, weft_baked_of_cloth(baked, kind), planes, values);
 }
 
 static void multiply(weft_baked *baked, weft_baked_kind kind, const double *factors, int planes)
@@ -275,6 +277,8 @@ static void multiply(weft_baked *baked, weft_baked_kind kind, const double *fact
         for (size_t i = 0; map->n_mips > 0 && i < weft_image_plane_size(&map->mips[0]); i++)
             weft_image_plane(&map->mips[0], p)[i] *= factor;
     }
+    if (weft_baked_of_cloth(baked, kind) != kind)
+        multiply(baked, weft_baked_of_cloth(baked, kind), factors, planes);
 }
 
 /* A picture becomes a map; with fewer planes than the map it multiplies the constant that is there. */
@@ -294,6 +298,8 @@ static weft_err put(const compositor *c, weft_baked *baked, weft_baked_kind kind
             weft_image_plane(to, p)[i] = from[i] * scale;
     }
     weft_image_fini(&at_size);
+    if (status == WEFT_OK && weft_baked_of_cloth(baked, kind) != kind)
+        status = put(c, baked, weft_baked_of_cloth(baked, kind), image, use, tiling, multiplies, err);
     return status;
 }
 
@@ -347,6 +353,7 @@ static weft_err put_u3m(const compositor *c, weft_baked *baked, const weft_rad_m
         drop_map(baked, kind);
         baked->maps[kind] = from.maps[kind];
         from.maps[kind] = (weft_baked_map){0};
+        baked->two_lobes = false; /* a U3M has one surface */
     }
     weft_baked_fini(&from);
     weft_u3m_close(u3m);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every export of three materials, each before its independent judge.  Judges that are not here are named.
+# Every export of four materials, each before its independent judge.  Judges that are not here are named.
 set -eu
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 judges=$WEFT_TEST_SOURCE/tests/judges
@@ -15,11 +15,13 @@ include <metal_thread.radattr>
 :pile := ( velvet :scan = "twill.maps" :albedo_tint_color = [0.5, 0.1, 0.1] )
 :shine := ( silk_satin :width_mm = 30 :tangent_rotation_deg = 30 )
 :gold := ( gold_thread :scan = "twill.maps" )
+:wet := ( opaquematerial :specular_roughness = 0.1 :albedo_color = 0.02 )
+:damp := ( velvet :layers = [ ( velvet :scan = "twill.maps" ) ( wet :mask = ( :from = noise ) ) ] )
 TEXT
-for material in pile shine gold; do
+for material in pile shine gold damp; do
     "$weft" bake swatch.radattr --material $material -o $material.material --size 256x128 --export all >/dev/null
 done
-python3 - pile shine gold <<'TEXT'
+python3 - pile shine gold damp <<'TEXT'
 import json, sys
 for name in sys.argv[1:]:
     for export in ("gltf", "u3m", "mtlx"):

@@ -4,6 +4,7 @@
 #include "core/colour.h"
 #include "core/file.h"
 #include "core/formats/png_file.h"
+#include "shading/brdf/brdf.h"
 #include "shading/material/composite.h"
 
 #include <math.h>
@@ -125,6 +126,97 @@ static void check_lobes(void **state)
                  WEFT_ERR_UNSUPPORTED, "no model shades both");
 }
 
+static double at_texel(const weft_baked *b, weft_baked_kind kind, int plane, size_t i)
+{
+    const weft_baked_map *const map = &b->maps[kind];
+    return (double)(map->n_mips ? weft_image_plane(&map->mips[0], plane)[i] : map->constant[plane]);
+}
+
+/* The parameters of ggx-cloth at a texel, in its order. */
+static void values_at(const weft_baked *b, size_t i, double values[WEFT_BRDF_MAX_PLANES])
+{
+    static const struct {
+        weft_baked_kind kind;
+        int planes;
+    } rows[] = {{WEFT_BAKED_ALBEDO, 3},       {WEFT_BAKED_SPECULAR, 3},     {WEFT_BAKED_ROUGHNESS, 1},
+                {WEFT_BAKED_CLOTH, 1},        {WEFT_BAKED_CLOTH_ALBEDO, 3}, {WEFT_BAKED_CLOTH_SPECULAR, 1},
+                {WEFT_BAKED_FRONT_TINT, 3},   {WEFT_BAKED_RIM_TINT, 3},     {WEFT_BAKED_CLOTH_ROUGHNESS, 1},
+                {WEFT_BAKED_RIM_AMPLITUDE, 1}};
+    for (size_t r = 0; r < sizeof rows / sizeof rows[0]; r++)
+        for (int p = 0; p < rows[r].planes; p++)
+            *values++ = at_texel(b, rows[r].kind, p, i);
+}
+
+/* GGX with cloth: what is seen is the blend of what both would show, for every mask, light and view. */
+static void check_two_lobes(void **state)
+{
+    (void)state;
+    static const uint16_t mask[4] = {0, 65535, 20000, 50000};
+    const weft_brdf *ggx, *cloth, *both;
+    double of_ggx[WEFT_BRDF_MAX_PLANES], of_cloth[WEFT_BRDF_MAX_PLANES], values[WEFT_BRDF_MAX_PLANES];
+    uint64_t random = 7;
+    weft_baked b = {0};
+    write_png("mask.png", 2, 1, mask, 16);
+    assert_ok(weft_brdf_find("ggx", &ggx, err));
+    assert_ok(weft_brdf_find("cloth-two-tone", &cloth, err));
+    assert_ok(weft_brdf_find("ggx-cloth", &both, err));
+    weft_brdf_defaults(ggx, of_ggx);
+    weft_brdf_defaults(cloth, of_cloth);
+    assert_ok(weft_brdf_set(ggx, "albedo=0.1,0.2,0.3", of_ggx, err));
+    assert_ok(weft_brdf_set(ggx, "f0=0.08", of_ggx, err));
+    assert_ok(weft_brdf_set(ggx, "alpha=0.15", of_ggx, err));
+    assert_ok(weft_brdf_set(cloth, "albedo=0.6,0.5,0.1", of_cloth, err));
+    assert_ok(weft_brdf_set(cloth, "f0=0.05", of_cloth, err));
+    assert_ok(weft_brdf_set(cloth, "alpha=0.7", of_cloth, err));
+    assert_ok(weft_brdf_set(cloth, "rim=1,0.5,0.2", of_cloth, err));
+    assert_ok(weft_brdf_set(cloth, "amplitude=3", of_cloth, err));
+    assert_ok(
+        bake(":wet := ( opaquematerial :albedo_color = [0.1, 0.2, 0.3] :specular_intensity = 0.08\n"
+             "         :specular_roughness = 0.15 )\n"
+             ":wool := ( clothmaterial :albedo_color = [0.6, 0.5, 0.1] :specular_intensity = 0.05\n"
+             "          :specular_roughness = 0.7 :rim_tint_color = [1, 0.5, 0.2] :rim_amplitude = 3 )\n"
+             ":m := ( clothmaterial :layers = [ ( wet ) ( wool :mask = ( :name = \"mask.png\" ) )\n"
+             "        ( wet :alpha = 0.3 ) ( wool :alpha = 0.2 ) ] )",
+             2, &b, err));
+    assert_true(b.two_lobes);
+    assert_string_equal(weft_baked_brdf(&b), "ggx-cloth");
+    for (size_t i = 0; i < 4; i++) {
+        const double share = mask[i] / 65535.0 * 0.7 * 0.8 + 0.2;
+        values_at(&b, i, values);
+        for (int k = 0; k < 50; k++) {
+            double l[3], v[3], one[3], two[3], f[3];
+            weft_brdf_direction(0.05 + 0.95 * weft_test_random(&random), 6 * weft_test_random(&random), l);
+            weft_brdf_direction(0.05 + 0.95 * weft_test_random(&random), 6 * weft_test_random(&random), v);
+            weft_brdf_eval_one(ggx, of_ggx, l, v, one);
+            weft_brdf_eval_one(cloth, of_cloth, l, v, two);
+            weft_brdf_eval_one(both, values, l, v, f);
+            for (int c = 0; c < 3; c++)
+                assert_near(f[c], (1 - share) * one[c] + share * two[c], 1e-5 * (one[c] + two[c]));
+        }
+    }
+    weft_baked_fini(&b);
+
+    /* a coat of colour alone lies on both; the material's own tint too; where cloth alone is left it is one
+     * lobe */
+    assert_ok(
+        bake(":wet := ( opaquematerial :albedo_color = 0.2 ) :wool := ( clothmaterial :albedo_color = 0.4 )\n"
+             ":dye := ( opaquematerial :albedo_color = [1, 0, 0] )\n"
+             ":m := ( clothmaterial :layers = [ ( wet ) ( wool :alpha = 0.5 )\n"
+             "        ( dye :alpha = 0.5 :channels = albedo ) ] :albedo_tint_color = 0.5 )",
+             2, &b, err));
+    assert_near((double)b.maps[WEFT_BAKED_CLOTH].constant[0], 0.5, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_ALBEDO].constant[0], 0.5 * 0.6, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_ALBEDO].constant[1], 0.5 * 0.1, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_CLOTH_ALBEDO].constant[0], 0.5 * 0.7, 1e-6);
+    assert_near((double)b.maps[WEFT_BAKED_CLOTH_ALBEDO].constant[1], 0.5 * 0.2, 1e-6);
+    weft_baked_fini(&b);
+    assert_ok(bake(":wool := ( clothmaterial :specular_roughness = 0.4 )\n"
+                   ":m := ( clothmaterial :layers = [ ( wool ) ( wool :alpha = 0.5 ) ] )",
+                   2, &b, err));
+    assert_false(b.two_lobes);
+    weft_baked_fini(&b);
+}
+
 /* Every mask is 0..1, and one from noise repeats. */
 static void check_generated_masks(void **state)
 {
@@ -171,7 +263,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(check_constants),           cmocka_unit_test(check_mask_and_normals),
         cmocka_unit_test(check_texture_conventions), cmocka_unit_test(check_lobes),
-        cmocka_unit_test(check_generated_masks),     cmocka_unit_test(check_missing_files),
+        cmocka_unit_test(check_two_lobes),           cmocka_unit_test(check_generated_masks),
+        cmocka_unit_test(check_missing_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
