@@ -10,6 +10,7 @@
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
 #include "host/capture/sidecar.h"
+#include "host/capture/weights.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -513,6 +514,20 @@ static weft_err tell_what_is_kept(const capture_run *run, weft_err status, weft_
     return status;
 }
 
+/* What can be said only of the whole, and sidecars that were lost.  set.json comes last: it says complete. */
+static weft_err finish_set(capture_run *run, bool changed, weft_error *err)
+{
+    if (changed && run->report.n_exposures > weft_set_n_lights(&run->set))
+        WEFT_TRY(weft_weights_record(&run->set, err));
+    for (int i = 0; i < run->plan.n && run->o.sidecar && changed; i++)
+        if (run->plan.frames[i].bracket >= 0)
+            WEFT_TRY(weft_sidecar_write(&run->set, run->plan.frames[i].row, err));
+    if (run->o.sidecar)
+        WEFT_TRY(weft_sidecar_write_missing(&run->set, err));
+    run->set.complete = true;
+    return weft_set_save(&run->set, err);
+}
+
 static weft_err capture(capture_run *run, weft_error *err)
 {
     weft_set_found found;
@@ -529,10 +544,7 @@ static weft_err capture(capture_run *run, weft_error *err)
         if (status != WEFT_OK)
             return tell_what_is_kept(run, status, err);
     }
-    if (run->o.sidecar) /* of frames from before */
-        WEFT_TRY(weft_sidecar_write_missing(&run->set, err));
-    run->set.complete = true;
-    return weft_set_save(&run->set, err);
+    return finish_set(run, missing > 0, err);
 }
 
 weft_err weft_capture_run(const weft_capture_options *options, weft_camera_device *camera,

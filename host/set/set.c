@@ -15,7 +15,8 @@ static const char *const role_names[] = {"light", "ambient", "dark", "all"};
 /* Keys that this file owns, at the top and inside "camera" and "sensor"; all others are kept in `other`. */
 static const char *const top_keys[] = {"weft", "version", "name", "created", "frames", "state", "mask", NULL};
 static const char *const camera_keys[] = {"backend", "model", "serial", NULL};
-static const char *const sensor_keys[] = {"width", "height", "cfa", "black", "white", "transfer", NULL};
+static const char *const sensor_keys[] = {"width", "height",   "cfa",   "black",
+                                          "white", "transfer", "noise", NULL};
 
 const char *weft_frame_role_name(weft_frame_role role)
 {
@@ -155,6 +156,22 @@ static weft_err read_black(weft_set *set, const json_t *sensor, const char *plac
     return WEFT_OK;
 }
 
+/* As the capture engine measured it; without it readers find it from the pictures. */
+static weft_err read_noise(weft_set *set, const json_t *sensor, const char *place, weft_error *err)
+{
+    const json_t *noise;
+    WEFT_TRY(weft_json_get_object(sensor, "noise", WEFT_JSON_OPTIONAL, &noise, place, err));
+    if (!noise)
+        return WEFT_OK;
+    WEFT_TRY(weft_json_get_number(noise, "read", WEFT_JSON_REQUIRED, 0, 1, &set->noise.read, place, err));
+    WEFT_TRY(weft_json_get_number(noise, "shot", WEFT_JSON_REQUIRED, 0, 1, &set->noise.shot, place, err));
+    WEFT_TRY(
+        weft_json_get_number(noise, "gain", WEFT_JSON_REQUIRED, 1e-6, 1e5, &set->noise_gain, place, err));
+    if (set->noise.read + set->noise.shot <= 0)
+        return weft_fail(err, WEFT_ERR_RANGE, "%s: \"noise\" says that there is none; take it out", place);
+    return WEFT_OK;
+}
+
 static weft_err read_sensor(weft_set *set, const json_t *root, const char *place, weft_error *err)
 {
     const json_t *sensor;
@@ -173,6 +190,7 @@ static weft_err read_sensor(weft_set *set, const json_t *root, const char *place
         if (!(set->black[i] >= 0) || (set->white > 0 && set->black[i] >= set->white))
             return weft_fail(err, WEFT_ERR_RANGE, "%s: black level %g, wanted 0 to below white (%g)", place,
                              set->black[i], set->white);
+    WEFT_TRY(read_noise(set, sensor, place, err));
     WEFT_TRY(weft_json_get_text(sensor, "transfer", WEFT_JSON_OPTIONAL, &transfer, place, err));
     if (strcmp(transfer, "srgb") != 0 && strcmp(transfer, "linear") != 0)
         return weft_fail(err, WEFT_ERR_FORMAT, "%s: \"transfer\" is \"%s\", wanted linear or srgb", place,
@@ -345,6 +363,10 @@ json_t *weft_set_sensor_to_json(const weft_set *set)
         json_object_set_new(sensor, "black", weft_json_numbers(set->black, 4));
         json_object_set_new(sensor, "white", json_real(set->white));
     }
+    if (sensor && set->noise_gain > 0)
+        json_object_set_new(sensor, "noise",
+                            json_pack("{s:f, s:f, s:f}", "read", set->noise.read, "shot", set->noise.shot,
+                                      "gain", set->noise_gain));
     if (sensor && set->cfa == WEFT_CFA_NONE)
         json_object_set_new(sensor, "transfer",
                             json_string(set->transfer == WEFT_TRANSFER_SRGB ? "srgb" : "linear"));
@@ -364,14 +386,15 @@ static json_t *describe(const weft_set *set)
 {
     json_t *const frames = json_array();
     for (int i = 0; i < set->n_frames; i++)
-        json_array_append_new(frames, weft_set_frame_to_json(&set->frames[i])); /* names were checked: not NULL */
+        json_array_append_new(frames,
+                              weft_set_frame_to_json(&set->frames[i])); /* names were checked: not NULL */
     json_t *const camera = json_pack("{s:s, s:s, s:s}", "backend", set->camera_backend, "model",
                                      set->camera_model, "serial", set->camera_serial);
     json_t *const root = json_pack("{s:s, s:i, s:s, s:s, s:o, s:o, s:o, s:s}", "weft", "set", "version",
                                    WEFT_SET_VERSION, "name", set->name ? set->name : "", "created",
                                    set->created, "camera", with_unknown(camera, set, "camera"), "sensor",
-                                   with_unknown(weft_set_sensor_to_json(set), set, "sensor"), "frames", frames,
-                                   "state", set->complete ? "complete" : "capturing");
+                                   with_unknown(weft_set_sensor_to_json(set), set, "sensor"), "frames",
+                                   frames, "state", set->complete ? "complete" : "capturing");
     if (root && set->mask_file)
         json_object_set_new(root, "mask", json_string(set->mask_file));
     if (root && set->other)
@@ -394,6 +417,17 @@ weft_err weft_set_save(const weft_set *set, weft_error *err)
 }
 
 /* ---- asking ---- */
+
+double weft_set_frame_time(const weft_set_frame *frame)
+{
+    return frame->exposure_s * frame->gain;
+}
+
+int weft_set_frame_mean_of(const weft_set_frame *frame)
+{
+    const json_t *const n = json_object_get(frame->capture, "mean_of");
+    return json_integer_value(n) > 1 && json_integer_value(n) <= 65536 ? (int)json_integer_value(n) : 1;
+}
 
 int weft_set_n_lights(const weft_set *set)
 {

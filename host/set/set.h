@@ -8,6 +8,7 @@
 #include "core/formats/raster.h"
 #include "core/formats/tiff_file.h"
 #include "core/image.h"
+#include "host/set/noise.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -43,6 +44,8 @@ typedef struct weft_set {
     weft_cfa cfa;    /* WEFT_CFA_NONE: RGB or grey pictures */
     double black[4]; /* DN per site of the 2x2 cell; used for mosaics in PNG and TIFF, checked for raws */
     double white;
+    weft_noise noise;       /* of a single frame at noise_gain */
+    double noise_gain;      /* 0: the noise was not measured */
     weft_transfer transfer; /* of 8-bit pictures */
     char *mask_file;        /* NULL when none */
     bool complete;          /* "state" */
@@ -59,6 +62,11 @@ void weft_set_fini(weft_set *set);
 weft_err weft_set_load(const char *folder, weft_set *set, weft_error *err);
 /** Writes set.json into set->folder, whole or not at all. */
 weft_err weft_set_save(const weft_set *set, weft_error *err);
+
+/** Exposure times gain, s: what a frame's linear values were divided by. */
+double weft_set_frame_time(const weft_set_frame *frame);
+/** Of how many frames the file is the mean, >= 1. */
+int weft_set_frame_mean_of(const weft_set_frame *frame);
 
 /** What set.json says of a frame, and of the sensor; a new reference, NULL without memory or for a name that
  *  is not UTF-8. */

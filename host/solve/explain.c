@@ -213,7 +213,7 @@ static void fill_light(const weft_light_plates *plates, const weft_solve_samples
         l->direction[c] = (double)s->at[j].light[c][0];
         cosine += l->direction[c] * e->normal[c];
     }
-    l->full_scale = plates->most[j] > 0 ? (double)raw * plates->time[j] : 0;
+    l->full_scale = plates->most[j] > 0 ? WEFT_SATURATION_SHARE * (double)raw / plates->most[j] : 0;
     l->value = (double)s->at[j].grey[0];
     l->mirror = matte ? l->value - (double)matte->at[j].grey[0] : 0;
     l->fit = k * cosine;

@@ -2,6 +2,8 @@
 
 #include "core/progress.h"
 
+#include <math.h>
+
 void weft_light_plates_fini(weft_light_plates *p)
 {
     for (int j = 0; j < p->n; j++)
@@ -19,18 +21,15 @@ static weft_err demosaic(weft_plate *plate, weft_demosaic how, weft_error *err)
     return WEFT_OK;
 }
 
-/* S-ORD-17 drops what exceeds 98 % of saturation.  In a bracket the merging has chosen already; pictures
- * made by others do not say where their sensor saturates. */
+/* S-ORD-17 drops what exceeds 98 % of saturation: of a bracket the shortest exposure's, as the merging has
+ * left out the others there.  Pictures made by others do not say where their sensor saturates. */
 static double saturation_limit(const weft_set *set, int light)
 {
     double limit = 0;
-    int n = 0;
     for (int i = 0; i < set->n_frames; i++)
-        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light) {
-            limit = 0.98 / (set->frames[i].exposure_s * set->frames[i].gain);
-            n++;
-        }
-    return n == 1 && set->cfa != WEFT_CFA_NONE ? limit : 0;
+        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light)
+            limit = fmax(limit, WEFT_SATURATION_SHARE / weft_set_frame_time(&set->frames[i]));
+    return set->cfa != WEFT_CFA_NONE ? limit : 0;
 }
 
 static double light_time(const weft_set *set, int light)
@@ -38,7 +37,7 @@ static double light_time(const weft_set *set, int light)
     double time = 0;
     for (int i = 0; i < set->n_frames; i++)
         if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light)
-            time += set->frames[i].exposure_s * set->frames[i].gain;
+            time += weft_set_frame_time(&set->frames[i]);
     return time;
 }
 

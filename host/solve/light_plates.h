@@ -6,13 +6,17 @@
 #include "host/set/plate.h"
 #include "host/solve/solve_row.h"
 
+/** Above this share of the range a value is taken for saturated (S-ORD-17). */
+#define WEFT_SATURATION_SHARE 0.98
+
 typedef struct weft_light_plates {
     int n, width, height; /* at solving size */
     weft_cfa cfa;         /* of mosaics at full size; NONE for grey and RGB, and at half size */
     weft_plate plate[WEFT_LIGHTS_MAX];
     weft_noise noise;             /* of a frame, as parts of full scale; {0}: not known */
     double time[WEFT_LIGHTS_MAX]; /* exposure times gain, s: of all frames of a bracket */
-    double most[WEFT_LIGHTS_MAX]; /* 98 % of saturation as linear value; 0 for brackets and pictures */
+    double most[WEFT_LIGHTS_MAX]; /* WEFT_SATURATION_SHARE of the (shortest) exposure's range as linear value;
+                                     0 for pictures */
 } weft_light_plates;
 
 /** What becomes of the photosites of a mosaic. */

@@ -38,7 +38,9 @@ static void test_what_is_written_is_read(void **state)
         set.black[i] = 250 + i;
     set.white = 15871;
     set.mask_file = weft_strdup("mask.png", NULL);
-    json_t *const capture = json_pack("{s:i}", "retries", 2);
+    set.noise = (weft_noise){1e-8, 3e-5};
+    set.noise_gain = 1.5;
+    json_t *const capture = json_pack("{s:i, s:i}", "retries", 2, "mean_of", 16);
     const weft_set_frame frames[] = {
         {.file = "light-00.dng",
          .role = WEFT_ROLE_LIGHT,
@@ -67,6 +69,10 @@ static void test_what_is_written_is_read(void **state)
         assert_true(back.width == 1232 && back.height == 816 && back.cfa == WEFT_CFA_GBRG &&
                     back.white == 15871);
         assert_memory_equal(back.black, set.black, sizeof set.black);
+        assert_true(back.noise.read == 1e-8 && back.noise.shot == 3e-5 && back.noise_gain == 1.5);
+        assert_near(weft_set_frame_time(&back.frames[0]), 0.1875, 0);
+        assert_int_equal(weft_set_frame_mean_of(&back.frames[0]), 16);
+        assert_int_equal(weft_set_frame_mean_of(&back.frames[1]), 1);
         assert_true(back.complete == set.complete && back.n_frames == 5 && !back.other);
         for (int i = 0; i < 5; i++) {
             const weft_set_frame *const a = &back.frames[i], *const b = &frames[i];
@@ -110,6 +116,9 @@ static void test_what_is_wrong_is_named(void **state)
 {
     (void)state;
 #define FRAME(text) HEAD SENSOR "\"frames\":[" text "],\"state\":\"complete\"}"
+#define NOISE(text)                                                                                          \
+    HEAD "\"sensor\":{\"width\":6,\"height\":9,\"cfa\":\"RGGB\",\"noise\":" text                             \
+         "},\"frames\":[],\"state\":\"complete\"}"
     const struct {
         const char *text;
         weft_err code;
@@ -140,6 +149,11 @@ static void test_what_is_wrong_is_named(void **state)
               "\"frames\":[],"
               "\"state\":\"complete\"}",
          WEFT_ERR_RANGE, "black level 9"},
+        {NOISE("7"), WEFT_ERR_FORMAT, "noise"},
+        {NOISE("{\"read\":1e-8,\"gain\":1}"), WEFT_ERR_FORMAT, "\"shot\" is missing"},
+        {NOISE("{\"read\":-1,\"shot\":1e-5,\"gain\":1}"), WEFT_ERR_RANGE, "\"read\" is -1"},
+        {NOISE("{\"read\":1e-8,\"shot\":1e-5,\"gain\":0}"), WEFT_ERR_RANGE, "\"gain\" is 0"},
+        {NOISE("{\"read\":0,\"shot\":0,\"gain\":1}"), WEFT_ERR_RANGE, "says that there is none"},
         {FRAME("7"), WEFT_ERR_FORMAT, "frame 0: is not an object"},
         {FRAME("{\"role\":\"dark\",\"exposure_s\":1}"), WEFT_ERR_FORMAT, "frame 0: \"file\" is missing"},
         {FRAME("{\"file\":\"a\",\"role\":\"flash\",\"exposure_s\":1}"), WEFT_ERR_FORMAT,

@@ -69,6 +69,11 @@ jq -e '[.frames[] | select(.light == 4)] | length == 2 and .[1].exposure_s / .[0
 jq -e '[.frames[] | select(.role == "light" and .light != 3 and (.capture.bracket // 0) == 0)
     | .capture.statistics.high | max > 0.6 and max < 0.8] | all' own.set/set.json >tell.out ||
     fail "a light's own exposure misses 70 %: $(jq -c '[.frames[].capture.statistics.high]' own.set/set.json)"
+jq -e '[.frames[] | select(.light == 3) | .capture.weight] | add > 0.999 and add < 1.001 and .[1] < .[0] and .[0] < .[2]' \
+    own.set/set.json >tell.out || fail "weights: $(jq -c '[.frames[].capture.weight]' own.set/set.json)"
+# the sensor's full well is 30000 electrons
+jq -e '.sensor.noise | .shot * 30000 > 0.9 and .shot * 30000 < 1.1 and .gain == 1' own.set/set.json >tell.out ||
+    fail "noise: $(jq -c .sensor own.set/set.json)"
 [ -f own.set/Harris-Tweed-7_light03_0.0025s.dng ] || fail "names: $(ls own.set)"
 jq -e --slurpfile set own.set/set.json '.frame == ($set[0].frames[] | select(.light == 3 and .capture.bracket == 0))' \
     own.set/Harris-Tweed-7_light03_0.0025s.dng.json >tell.out || fail "a sidecar differs from set.json"
