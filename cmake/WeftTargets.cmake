@@ -48,8 +48,12 @@ function(weft_test_properties name timeout serial)
   if(NOT timeout)
     set(timeout 300) # generous: a busy machine is no failure
   endif()
+  set(sanitized) # "1": scripts repeat what is slow less often
+  if(WEFT_SANITIZE)
+    set(sanitized 1)
+  endif()
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT ${timeout}
-    ENVIRONMENT "WEFT_SOCKET=none;WEFT_TEST_BIN=${CMAKE_BINARY_DIR}/bin;WEFT_TEST_SOURCE=${CMAKE_SOURCE_DIR};WEFT_TEST_BUILD=${CMAKE_BINARY_DIR};ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;OPENBLAS_NUM_THREADS=1")
+    ENVIRONMENT "WEFT_SOCKET=none;WEFT_TEST_BIN=${CMAKE_BINARY_DIR}/bin;WEFT_TEST_SOURCE=${CMAKE_SOURCE_DIR};WEFT_TEST_BUILD=${CMAKE_BINARY_DIR};WEFT_TEST_SANITIZE=${sanitized};ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;OPENBLAS_NUM_THREADS=1")
   if(serial)
     set_tests_properties(${name} PROPERTIES RESOURCE_LOCK rig)
   endif()

@@ -47,10 +47,9 @@ static void on_line(void *context, const char *stream, const char *text)
 
 static void on_report(void *context, json_t *message, int picture)
 {
-    (void)context;
+    (void)context, (void)message;
     if (picture >= 0)
         close(picture);
-    json_decref(message);
 }
 
 static void on_end(void *context, int status)

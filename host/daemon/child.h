@@ -20,7 +20,7 @@
 typedef struct weft_child_ears {
     /* A line on stream "out" or "err", valid UTF-8, without newline. */
     void (*line)(void *context, const char *stream, const char *text);
-    /* A message of core/report_channel.h; `picture` is a sealed memfd of the owner's, or -1. */
+    /* A message of core/report_channel.h, lent; `picture` is a sealed memfd of the owner's, or -1. */
     void (*report)(void *context, json_t *message, int picture);
     /* It has ended and everything it said has been heard; `status` as of waitpid().  The child may be
      * destroyed. */

@@ -3,7 +3,8 @@
 # WEFT_BATCH_SETS is the number of sets of the killed batch.
 set -eu
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
-sets=${WEFT_BATCH_SETS:-16}
+sets=${WEFT_BATCH_SETS:-${WEFT_TEST_SANITIZE:+6}}
+sets=${sets:-16}
 export OMP_NUM_THREADS=1
 size=${WEFT_BATCH_SIZE:-308x204}
 
@@ -23,12 +24,14 @@ whole() { find maps -path 'maps/*.maps/*' ! -path 'maps/batch/*' -printf '%p %i 
 events() { grep -c "\"event\":\"$1\"" maps/batch/events.jsonl; }
 count() { find maps -maxdepth 1 -name '*.maps' | wc -l; }
 
+still_there() { kill -0 $pid 2>/dev/null || { echo "FAILED: the batch ended too early"; cat batch.out; exit 1; }; }
+
 # killed twice, when a third and when two thirds are done, in the middle of others
 for part in 1 2; do
-    "${batch[@]}" >/dev/null 2>&1 &
+    "${batch[@]}" >batch.out 2>&1 &
     pid=$!
-    until [ -d maps ] && [ "$(count)" -ge $((sets * part / 3)) ]; do sleep 0.05; done
-    until [ "$(events begin)" -gt "$(events solved)" ]; do sleep 0.02; done
+    until [ -d maps ] && [ "$(count)" -ge $((sets * part / 3)) ]; do still_there; sleep 0.05; done
+    until [ "$(events begin)" -gt "$(events solved)" ]; do still_there; sleep 0.02; done
     sleep 0.1
     kill -KILL $pid
     wait $pid 2>/dev/null || true

@@ -10,7 +10,8 @@ set -eu
 [ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
 [ -f "$WEFT_TEST_BIN/libweft_lens_opencv.so" ] || { echo "skipped: this build has no OpenCV"; exit 77; }
 seeds=${WEFT_FABRIC_SEEDS:-1} size=${WEFT_FABRIC_SIZE:-616x408}
-samples=${WEFT_FABRIC_SAMPLES:-satin corduroy}
+samples=${WEFT_FABRIC_SAMPLES:-${WEFT_TEST_SANITIZE:+satin}}
+samples=${samples:-satin corduroy}
 boards=$(seq -s, -f "board-%g" 0 8)
 mm=$(python3 -c "print(0.125 * 1232 / int('$size'.split('x')[0]))")
 
