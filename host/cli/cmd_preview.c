@@ -21,6 +21,7 @@ typedef struct preview_args {
     int shape, area, sky_model, tone, sweep, shadow_steps, shadow_blur, folds, voxels;
     bool draft, self_shadow;
     const char *height_map;
+    int filter, taps;
     weft_size size;
     double exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
@@ -200,6 +201,19 @@ static const weft_field fields[] = {
      .max = 512,
      .def = "128",
      .help = "of that grid, along the drape's width"},
+    {.key = "filter",
+     .type = WEFT_FIELD_CHOICE,
+     .offset = offsetof(preview_args, filter),
+     .choices = weft_preview_filter_names,
+     .def = "anisotropic",
+     .help = "materials: every texel shaded, or their mips looked up by the pixel's footprint"},
+    {.key = "taps",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, taps),
+     .min = 1,
+     .max = WEFT_PREVIEW_MAX_TAPS,
+     .def = "8",
+     .help = "most look-ups along a footprint of --filter anisotropic"},
     {.key = "match",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(preview_args, match),
@@ -350,6 +364,8 @@ static weft_err set_view(const preview_args *a, weft_preview_view *view, weft_er
                                            .folds = (weft_preview_folds)a->folds,
                                            .voxels = a->voxels,
                                            .voxel_steps = a->voxels < 32 ? 8 : a->voxels / 4};
+    view->filter = (weft_preview_filter)a->filter;
+    view->max_taps = a->taps;
     return WEFT_OK;
 }
 
@@ -380,10 +396,14 @@ static weft_err look_at_input(const weft_invocation *inv, const preview_args *a,
     const weft_size size = picture_size(a, &shown);
     view->width = size.width;
     view->height = size.height;
-    if (status == WEFT_OK && view->crop.width == 0)
+    if (status == WEFT_OK && view->crop.width == 0 && view->filter == WEFT_PREVIEW_SAMPLES)
         status = weft_preview_input_level(&input, texels_per_px(a, &input.surface, size), err);
     if (status == WEFT_OK && a->self_shadow)
         status = weft_preview_input_height(&input, folder, a->height_map, err);
+    if (status == WEFT_OK && a->sweep) { /* once for all pictures */
+        status = weft_preview_pack(&input.surface, view, &input.texture, err);
+        input.surface.texture = &input.texture;
+    }
     if (status == WEFT_OK)
         status = a->sweep ? sweep(inv, a, &input, view, seconds, err)
                           : look(a, a->output, &input, view, seconds, err);

@@ -63,6 +63,9 @@ static weft_err make_surface(weft_preview_input *input, const char *folder, cons
     return WEFT_OK;
 }
 
+/* Texels along a pixel that are shaded one by one. */
+enum { MOST_TEXELS = 8 };
+
 /* Which of a material's maps is which parameter. */
 static const struct {
     const char *param;
@@ -93,7 +96,8 @@ static void use_material_map(weft_preview_surface *surface, const char *param, c
         const double value = (double)map->constant[planes == 3 ? c : 0];
         surface->params[plane + c] = value < row->min ? row->min : value > row->max ? row->max : value;
         surface->maps[plane + c] =
-            map->n_mips ? (weft_preview_map){&map->mips[level], planes == 3 ? c : 0} : (weft_preview_map){0};
+            map->n_mips ? (weft_preview_map){&map->mips[level], planes == 3 ? c : 0, map->n_mips - level}
+                        : (weft_preview_map){0};
     }
 }
 
@@ -110,6 +114,7 @@ static weft_err use_level(weft_preview_input *input, int level, weft_error *err)
     surface->origin_mm[0] = -0.5 * (surface->width - 1) * surface->mm_per_px;
     surface->origin_mm[1] = 0.5 * (surface->height - 1) * surface->mm_per_px;
     surface->normal = normal->n_mips ? &normal->mips[level] : NULL;
+    surface->normal_levels = normal->n_mips ? normal->n_mips - level : 0;
     for (size_t i = 0; i < sizeof material_params / sizeof material_params[0]; i++) {
         const weft_baked_kind kind = material_params[i].kind;
         use_material_map(surface, material_params[i].param, &baked->maps[kind], weft_baked_rows[kind].planes,
@@ -175,7 +180,7 @@ weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_p
     if (!input->baked.width || input->n_extra)
         return WEFT_OK; /* pictures given for parameters have one size only */
     const int levels = weft_baked_levels(input->baked.width, input->baked.height);
-    for (double t = texels_per_px; t > 1 && level < levels - 1; t /= 2)
+    for (double t = texels_per_px; t > MOST_TEXELS && level < levels - 1; t /= 2)
         level++;
     for (int k = 0; k < WEFT_BAKED_COUNT; k++)
         if (input->baked.maps[k].n_mips && level > input->baked.maps[k].n_mips - 1)
@@ -220,6 +225,7 @@ void weft_preview_input_fini(weft_preview_input *input)
     weft_image_fini(&input->height_mm);
     for (int i = 0; i < input->n_extra; i++)
         weft_image_fini(&input->extra[i]);
+    weft_preview_texture_fini(&input->texture);
     weft_maps_fini(&input->maps);
     weft_baked_fini(&input->baked);
     weft_merl_destroy(input->measured);

@@ -16,8 +16,9 @@ typedef struct weft_preview_input {
     weft_texts params;
     int n_extra;
     weft_image extra[WEFT_TEXTS_MAX]; /* maps of parameters: --param alpha=roughness.exr */
-    weft_image height_mm; /* of weft_preview_input_height(), when it was read */
-    int level;            /* of the material's mips that is shown */
+    weft_image height_mm;             /* of weft_preview_input_height(), when it was read */
+    int level;                        /* of the material's mips that is shown */
+    weft_preview_texture texture;     /* of a material for several pictures; empty until packed */
     weft_preview_surface surface;
 } weft_preview_input;
 
@@ -33,8 +34,8 @@ typedef struct weft_preview_input {
 weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, const char *brdf,
                                  const weft_texts *params, weft_error *err);
 
-/** Shows a level of a material's mips, the first with at most `texels_per_px` texels a pixel; its roughness
- *  answers for the normals that it averages.  Does nothing to maps.  Before this it is level 0. */
+/** Begins a material's chains of mips at the first level with at most 8 texels a pixel, for pictures that
+ * shade every texel (WEFT_PREVIEW_SAMPLES).  Does nothing to maps.  Before this it is level 0. */
 weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_px, weft_error *err);
 
 /**

@@ -9,6 +9,8 @@
 
 #include <string.h>
 
+const char weft_preview_filter_names[] = "samples|trilinear|anisotropic";
+
 void weft_preview_direction(double azimuth_deg, double elevation_deg, double direction[3])
 {
     const double a = azimuth_deg * WEFT_PI / 180, e = elevation_deg * WEFT_PI / 180;
@@ -24,7 +26,9 @@ weft_preview_view weft_preview_view_defaults(void)
                               .n_lights = 1,
                               .background = 0.18,
                               .repeat = 1,
-                              .shadows = {.steps = 64, .voxels = 128, .voxel_steps = 32}};
+                              .shadows = {.steps = 64, .voxels = 128, .voxel_steps = 32},
+                              .filter = WEFT_PREVIEW_ANISOTROPIC,
+                              .max_taps = 8};
     weft_preview_direction(135, 45, view.lights[0].direction);
     for (int c = 0; c < 3; c++)
         view.lights[0].irradiance[c] = WEFT_PI;
@@ -53,7 +57,7 @@ weft_err weft_preview_set_map(weft_preview_surface *surface, const char *name, c
         return weft_fail(err, WEFT_ERR_MISMATCH, "the %s map has %d planes, wanted %s", name, image->planes,
                          param->components == 3 ? "1 or 3" : "1");
     for (int c = 0; c < param->components; c++)
-        surface->maps[plane + c] = (weft_preview_map){image, image->planes == 1 ? 0 : c};
+        surface->maps[plane + c] = (weft_preview_map){image, image->planes == 1 ? 0 : c, 1};
     return WEFT_OK;
 }
 
@@ -154,7 +158,19 @@ static void shade_run(const weft_preview_setup *setup, weft_preview_samples *s, 
         s->y[i] = (float)inside(y, setup->view->height);
     }
     weft_preview_hit(setup, s);
-    weft_preview_fetch(setup, s);
+    bool any = false;
+    for (int i = 0; i < n; i++)
+        any |= s->hit[i] > 0;
+    if (!any) {
+        for (int c = 0; c < 3; c++)
+            for (int i = 0; i < n; i++)
+                s->value[c][i] = (float)setup->view->background;
+        return;
+    }
+    if (setup->texture)
+        weft_preview_fetch_filtered(setup, s);
+    else
+        weft_preview_fetch(setup, s);
     shade(setup, s);
 }
 
@@ -246,6 +262,10 @@ static weft_err check_surface(const weft_preview_surface *surface, const weft_pr
                              "a light at a position in mm needs maps with a scale; these have none (solve "
                              "with --geometry plane, or give the light as azimuth and elevation)");
     WEFT_TRY(check_shadows(surface, view, err));
+    if (view->filter != WEFT_PREVIEW_SAMPLES &&
+        (view->max_taps < 1 || view->max_taps > WEFT_PREVIEW_MAX_TAPS))
+        return weft_fail(err, WEFT_ERR_RANGE, "%d look-ups along a footprint; wanted 1 to %d", view->max_taps,
+                         WEFT_PREVIEW_MAX_TAPS);
     if (!(view->repeat > 0 && view->repeat <= 1000) || !(view->fov_deg >= 0 && view->fov_deg < 170))
         return weft_fail(err, WEFT_ERR_RANGE, "wanted a repeat of more than 0 and a field of view below 170");
     return WEFT_OK;
@@ -283,20 +303,57 @@ static void set_ranges(weft_preview_setup *setup)
     }
 }
 
+/* Checks the input and fills what does not depend on the maps' contents.  `finest` gets the finest level of
+ * the chains that is wanted, -1 where they are not used. */
+static weft_err prepare(weft_preview_setup *setup, int *finest, weft_error *err)
+{
+    const weft_preview_surface *const surface = setup->surface;
+    const weft_preview_view *const view = setup->view;
+    WEFT_TRY(check_surface(surface, view, err));
+    WEFT_TRY(find_crop(surface, view, &setup->crop, err));
+    set_ranges(setup);
+    weft_preview_setup_shape(setup);
+    const bool filtered =
+        view->filter != WEFT_PREVIEW_SAMPLES && !surface->mask && weft_preview_surface_levels(surface) > 1;
+    if (view->draft || filtered)
+        setup->supersampling = view->draft ? 1 : 2;
+    const double lod = log2(setup->texels_per_px / setup->supersampling);
+    *finest = !filtered ? -1 : lod > 0 ? (int)lod : 0;
+    return WEFT_OK;
+}
+
+weft_err weft_preview_pack(const weft_preview_surface *surface, const weft_preview_view *view,
+                           weft_preview_texture *texture, weft_error *err)
+{
+    weft_preview_setup setup = {.surface = surface, .view = view};
+    int finest;
+    *texture = (weft_preview_texture){0};
+    WEFT_TRY(prepare(&setup, &finest, err));
+    return finest < 0 ? WEFT_OK : weft_preview_texture_init(texture, surface, finest, err);
+}
+
+/* The surface's texture where it has the level, else `own`. */
+static weft_err choose_texture(weft_preview_setup *setup, int finest, weft_preview_texture *own,
+                               weft_error *err)
+{
+    const weft_preview_texture *const given = setup->surface->texture;
+    if (finest < 0)
+        return WEFT_OK;
+    setup->texture = given && given->texels && given->first <= finest ? given : own;
+    return setup->texture == own ? weft_preview_texture_init(own, setup->surface, finest, err) : WEFT_OK;
+}
+
 weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
                              weft_image *picture, weft_error *err)
 {
     weft_preview_setup setup = {.surface = surface, .view = view};
-    weft_image made = {0};
-    WEFT_TRY(check_surface(surface, view, err));
-    WEFT_TRY(find_crop(surface, view, &setup.crop, err));
-    set_ranges(&setup);
-    weft_preview_setup_shape(&setup);
-    if (view->draft)
-        setup.supersampling = 1;
+    weft_preview_texture own = {0};
     weft_preview_visibility visibility = {0};
-    weft_err status = WEFT_OK;
-    if (wants_visibility(view)) {
+    weft_image made = {0};
+    int finest;
+    WEFT_TRY(prepare(&setup, &finest, err));
+    weft_err status = choose_texture(&setup, finest, &own, err);
+    if (status == WEFT_OK && wants_visibility(view)) {
         status = weft_preview_visibility_init(&visibility, &setup, err);
         setup.visibility = &visibility;
     }
@@ -310,6 +367,7 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
             weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
     weft_environment_planes_fini(&setup.around);
     weft_preview_visibility_fini(&visibility);
+    weft_preview_texture_fini(&own);
     if (status != WEFT_OK)
         weft_image_fini(&made);
     else

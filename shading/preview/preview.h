@@ -5,9 +5,12 @@
  * Normal maps are X right, Y up, Z out.  Light is linear BT.709.  A white Lambertian card that faces the
  * light reads 1 at exposure 0 (irradiance pi), so albedos can be read off; nothing is tone mapped.
  *
- * Every sample is shaded before it is averaged: a filtered normal map would look smoother than the cloth.
- * There is at least one sample a texel and four a pixel, weighted by a tent two pixels wide, which keeps
- * weaves near the pixel pitch from beating.
+ * Maps of one size: every sample is shaded before it is averaged, for an averaged normal map would look
+ * smoother than the cloth.  There is at least one sample a texel and four a pixel, weighted by a tent two
+ * pixels wide, which keeps weaves near the pixel pitch from beating.
+ *
+ * Maps with chains of mips (shading/bake/mips.h), whose roughness answers for the normals that were averaged,
+ * are looked up at the size of the sample's footprint: four samples a pixel, or one.
  */
 #ifndef WEFT_SHADING_PREVIEW_PREVIEW_H
 #define WEFT_SHADING_PREVIEW_PREVIEW_H
@@ -17,6 +20,7 @@
 #include "shading/brdf/brdf.h"
 #include "shading/lighting/environment_map.h"
 #include "shading/lighting/environment_table.h"
+#include "shading/preview/preview_texture.h"
 
 #include <stdbool.h>
 
@@ -78,7 +82,20 @@ void weft_preview_direction(double azimuth_deg, double elevation_deg, double dir
 typedef struct weft_preview_map {
     const weft_image *image; /* NULL: the constant */
     int plane;
+    int levels; /* image[0..levels-1] is its chain of mips, each half of the one before; 0 counts as 1 */
 } weft_preview_map;
+
+/** How maps with chains of mips are looked up. */
+typedef enum weft_preview_filter {
+    WEFT_PREVIEW_SAMPLES,     /* not at all: level 0, all of it shaded */
+    WEFT_PREVIEW_TRILINEAR,   /* as wide as the longer axis of the footprint: blurs where the surface leans */
+    WEFT_PREVIEW_ANISOTROPIC, /* as wide as the shorter one, up to max_taps times along the longer */
+} weft_preview_filter;
+
+/** "samples|trilinear|anisotropic", in the order of the enum. */
+extern const char weft_preview_filter_names[];
+
+#define WEFT_PREVIEW_MAX_TAPS 16
 
 /** What is looked at.  Pictures are borrowed. */
 typedef struct weft_preview_surface {
@@ -86,8 +103,10 @@ typedef struct weft_preview_surface {
     double mm_per_px;         /* 0: unknown (no point lights then) */
     double origin_mm[2];      /* world x, y of the centre of pixel (0, 0); for point lights over the plane */
     const weft_image *normal; /* [3]; NULL: flat.  Need not be unit length; (0,0,0) counts as (0,0,1) */
-    const weft_image *height_mm; /* 1 plane; NULL: unknown */
-    const weft_mask *mask;       /* 0 shows the background; NULL: all of it is the sample */
+    const weft_image *height_mm;         /* 1 plane; NULL: unknown */
+    int normal_levels;                   /* of its chain of mips; 0 counts as 1 */
+    const weft_preview_texture *texture; /* the maps packed, for the filters; NULL: each picture packs them */
+    const weft_mask *mask;               /* 0 shows the background; NULL: all of it is the sample */
     const weft_brdf *brdf;
     double params[WEFT_BRDF_MAX_PLANES];         /* constants, see weft_brdf_defaults() */
     weft_preview_map maps[WEFT_BRDF_MAX_PLANES]; /* override the constants; clamped to their ranges */
@@ -146,11 +165,18 @@ typedef struct weft_preview_view {
     double repeat;          /* sphere: how often the shorter side of the map fits half round; > 0 */
     weft_preview_crop crop; /* the part of the map that is shown; width 0: weft_preview_whole() */
     bool draft;             /* one sample a pixel, at its middle: for maps filtered to the pixels' size */
-    double fov_deg;         /* 0: orthographic; else the camera's field of view over the shorter side */
+    weft_preview_filter filter; /* where all maps have chains and nothing is masked; else samples */
+    int max_taps;               /* 1..WEFT_PREVIEW_MAX_TAPS */
+    double fov_deg;             /* 0: orthographic; else the camera's field of view over the shorter side */
 } weft_preview_view;
 
 /** 512 x 512, plane, one light from the upper left at 45 degrees, ambient 0, background 0.18, repeat 1. */
 weft_preview_view weft_preview_view_defaults(void);
+
+/** Packs the maps for pictures like the view's; surface->texture may then point to it.  Leaves it empty where
+ * the view does not filter the surface.  @return as weft_preview_render() */
+weft_err weft_preview_pack(const weft_preview_surface *surface, const weft_preview_view *view,
+                           weft_preview_texture *texture, weft_error *err);
 
 /**
  * Renders the surface.

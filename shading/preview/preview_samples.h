@@ -50,6 +50,7 @@ typedef struct weft_preview_setup {
     int albedo_plane;     /* first plane of the parameter "albedo"; -1 when the model has none */
     int alpha_plane;      /* of "alpha"; -1 when the model has none */
     const struct weft_preview_visibility *visibility;             /* NULL: no shadows but those by formula */
+    const weft_preview_texture *texture;                          /* NULL: the maps are sampled */
     weft_environment_planes around;                               /* the view's surroundings; empty without */
     double low[WEFT_BRDF_MAX_PLANES], high[WEFT_BRDF_MAX_PLANES]; /* ranges of the parameters */
 } weft_preview_setup;
@@ -104,6 +105,9 @@ bool weft_preview_add_split_sum(const weft_preview_setup *setup, weft_preview_sa
 
 /** Adds the surroundings' light to radiance. */
 void weft_preview_add_surroundings(const weft_preview_setup *setup, weft_preview_samples *s);
+
+/** The same from chains of mips, by the footprints of the samples. */
+void weft_preview_fetch_filtered(const weft_preview_setup *setup, weft_preview_samples *s);
 
 /** Fills normal and param from u and v; takes masked places off hit. */
 void weft_preview_fetch(const weft_preview_setup *setup, weft_preview_samples *s);
