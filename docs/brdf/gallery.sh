@@ -75,11 +75,8 @@ gloss=gloss=0,0.235,0.471,0.706,0.941
 quiet preview -q -o cod-gloss.png --brdf lambert-multiscatter "${sphere[@]}" --columns $gloss --lamp 135,30
 quiet preview -q -o cod-gloss-specular.png --brdf ggx-specular "${sphere[@]}" \
     --columns alpha=1,0.321,0.0742,0.0171,0.00395 --sky 135,40 --lamp 135,40 --tone agx --param f0=0.5
-quiet preview -q -o unreal-4.png --brdf ggx-specular "${sphere[@]}" --columns alpha=0.01,0.04,0.16,0.36,0.64,1 \
-    --sky 200,25 --lamp none --param f0=0.95 --tone agx
 for area in points representative; do
-    quiet preview -q -o "unreal-10-$area.png" --brdf ggx-specular "${sphere[@]}" --columns alpha=0.02,0.06,0.16,0.36,0.64 \
-        --lamp ball:-50,70,120,25,0.5 --area $area --param f0=0.3 --tone agx
     quiet preview -q -o "unreal-13-$area.png" --brdf ggx-specular "${sphere[@]}" --columns alpha=0.02,0.06,0.16,0.36,0.64 \
         --lamp tube:-90,60,110,90,60,110,0.5 --area $area --param f0=0.3 --tone agx
 done
+"$(dirname "$weft")/weft-figures" .

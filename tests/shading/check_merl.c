@@ -127,7 +127,7 @@ static void test_every_number_is_where_readers_look(void **state)
         angles_deg(light, view, angle);
         const int index = index_of(angle, cell);
         for (int c = 0; c < 3; c++)
-            got[c] = stored[c * CELLS + index] * scale[c];
+            got[c] = stored[(size_t)c * CELLS + (size_t)index] * scale[c];
         const double h = cell[0], from[3] = {h * h / 90, cell[1], cell[2]};
         const double middle[3] = {(h + 0.5) * (h + 0.5) / 90, from[1] + 0.5, from[2] + 0.5};
         const double end[3] = {(h + 1) * (h + 1) / 90, from[1] + 1, from[2] + 1};
@@ -153,11 +153,11 @@ static void test_cells_below_the_horizon_are_marked(void **state)
     for (int i = 0; i < CELLS; i++) {
         const bool below = stored[i] < 0;
         marked += below;
-        if (below && (stored[CELLS + i] != -1 || stored[2 * CELLS + i] != -1))
+        if (below && (stored[CELLS + i] != -1 || stored[(size_t)2 * CELLS + (size_t)i] != -1))
             fail_msg("cell %d is marked in red alone", i);
     }
     assert_true(stored[80 * 180 + 180 * 90 * 85] < 0); /* half vector and difference near the horizon */
-    assert_true(stored[0] >= 0 && stored[180 * 90] >= 0);
+    assert_true(stored[0] >= 0 && stored[(size_t)180 * 90] >= 0);
     assert_in_range(marked, CELLS / 5, CELLS / 2);
     free(stored);
 }
