@@ -1,6 +1,7 @@
 /*
  * One .glb: a flat swatch of true size in metres under the core metallic-roughness model with the extensions
- * that cloth needs (glTF 2.0; KHR_materials_sheen, _anisotropy, _specular).
+ * that cloth needs (glTF 2.0; KHR_materials_sheen, _anisotropy, _specular).  Its pictures are PNG that any
+ * reader takes, or KTX2 with the filtered mips (KHR_texture_basisu).
  */
 #include "shading/export/exporter.h"
 
@@ -10,6 +11,7 @@
 #include "core/version.h"
 #include "shading/brdf/albedo.h"
 #include "shading/export/channels.h"
+#include "shading/export/ktx2.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,6 +24,7 @@
 typedef struct glb {
     const weft_export_job *job;
     const weft_baked *baked;
+    bool ktx2; /* pictures are KTX2 */
     weft_text_buffer bin;
     json_t *root, *views, *images, *textures;
 } glb;
@@ -39,26 +42,37 @@ static int add_view(glb *g, const void *bytes, size_t n, int target)
     return (int)json_array_size(g->views) - 1;
 }
 
-/* A PNG inside the file; `index` is that of its texture. */
+static weft_err encode_picture(const glb *g, const weft_channels *channels, weft_text_buffer *bytes,
+                               weft_error *err)
+{
+    weft_raster raster = {0};
+    if (g->ktx2)
+        return weft_ktx2_encode(g->baked, channels, WEFT_KTX2_UASTC, bytes, err);
+    WEFT_TRY(weft_channels_raster(g->baked, channels, 0, &raster, err));
+    weft_err status = weft_png_encode(&raster, bytes);
+    if (status == WEFT_OK)
+        status = weft_text_buffer_status(bytes, err);
+    weft_raster_fini(&raster);
+    return status;
+}
+
+/* A picture inside the file; `index` is that of its texture. */
 static weft_err add_picture(glb *g, const char *name, const weft_channels *channels, int *index,
                             weft_error *err)
 {
-    weft_raster raster = {0};
-    weft_text_buffer png = {0};
-    WEFT_TRY(weft_channels_raster(g->baked, channels, 0, &raster, err));
-    weft_err status = weft_png_encode(&raster, &png);
-    if (status == WEFT_OK)
-        status = weft_text_buffer_status(&png, err);
+    weft_text_buffer bytes = {0};
+    const weft_err status = encode_picture(g, channels, &bytes, err);
     if (status == WEFT_OK) {
-        const int view = add_view(g, png.text, png.n, 0);
-        json_array_append_new(g->images, json_pack("{s:s, s:s, s:i}", "name", name, "mimeType", "image/png",
-                                                   "bufferView", view));
-        json_array_append_new(g->textures, json_pack("{s:i, s:i}", "sampler", 0, "source",
-                                                     (int)json_array_size(g->images) - 1));
+        const int view = add_view(g, bytes.text, bytes.n, 0), source = (int)json_array_size(g->images);
+        json_array_append_new(g->images, json_pack("{s:s, s:s, s:i}", "name", name, "mimeType",
+                                                   g->ktx2 ? "image/ktx2" : "image/png", "bufferView", view));
+        json_array_append_new(g->textures, g->ktx2
+                                               ? json_pack("{s:i, s:{s:{s:i}}}", "sampler", 0, "extensions",
+                                                           "KHR_texture_basisu", "source", source)
+                                               : json_pack("{s:i, s:i}", "sampler", 0, "source", source));
         *index = (int)json_array_size(g->textures) - 1;
     }
-    weft_text_buffer_fini(&png);
-    weft_raster_fini(&raster);
+    weft_text_buffer_fini(&bytes);
     return status;
 }
 
@@ -359,10 +373,14 @@ static weft_err add_material(glb *g, weft_error *err)
     const char *name;
     json_t *value;
     json_object_foreach(extensions, name, value) json_array_append_new(used, json_string(name));
-    if (json_array_size(used) > 0) {
+    if (json_array_size(used) > 0)
         json_object_set(material, "extensions", extensions);
-        json_object_set(g->root, "extensionsUsed", used);
+    if (g->ktx2 && json_array_size(g->textures) > 0) {
+        json_array_append_new(used, json_string("KHR_texture_basisu"));
+        json_object_set_new(g->root, "extensionsRequired", json_pack("[s]", "KHR_texture_basisu"));
     }
+    if (json_array_size(used) > 0)
+        json_object_set(g->root, "extensionsUsed", used);
     json_object_set_new(material, "extras",
                         json_pack("{s:o, s:s}", "size_mm", numbers(g->baked->size_mm, 2), "model",
                                   weft_baked_brdf(g->baked)));
@@ -400,10 +418,11 @@ static weft_err write_glb(const glb *g, const char *path, weft_error *err)
     return status;
 }
 
-static weft_err write(const weft_export_job *job, weft_error *err)
+static weft_err write_swatch(const weft_export_job *job, bool ktx2, weft_error *err)
 {
     glb g = {.job = job,
              .baked = job->baked,
+             .ktx2 = ktx2,
              .root = json_object(),
              .views = json_array(),
              .images = json_array(),
@@ -431,7 +450,9 @@ static weft_err write(const weft_export_job *job, weft_error *err)
         status = write_glb(&g, path, err);
     if (!(job->baked->size_mm[0] > 0))
         weft_export_lose(job, "size: unknown, the swatch is 0.1 m wide; set :width_mm");
-    weft_export_lose(job, "mips: PNG has one level; readers average roughness as if normals were not there");
+    if (!ktx2)
+        weft_export_lose(job,
+                         "mips: PNG has one level; readers average roughness as if normals were not there");
     weft_export_lose(job, "height, cavity, curvature, bent cones: glTF has no place for them");
     json_decref(g.root);
     json_decref(g.views);
@@ -442,9 +463,34 @@ static weft_err write(const weft_export_job *job, weft_error *err)
     return status;
 }
 
+static weft_err write(const weft_export_job *job, weft_error *err)
+{
+    return write_swatch(job, false, err);
+}
+
+static weft_err write_ktx2(const weft_export_job *job, weft_error *err)
+{
+    const bool fits =
+        job->baked->width == 0 || weft_ktx2_is_basisu_size(job->baked->width, job->baked->height);
+    if (!fits)
+        weft_export_lose(job,
+                         "KTX2: glTF wants sides that are multiples of 4, not %d x %d; the pictures are PNG",
+                         job->baked->width, job->baked->height);
+    else
+        weft_export_lose(job, "pictures: UASTC keeps 8 bits a texel; the EXR maps have the rest");
+    return write_swatch(job, fits, err);
+}
+
 const weft_exporter weft_exporter_gltf = {
     .name = "gltf",
     .summary = "a .glb: a swatch of true size with sheen, anisotropy and specular extensions",
     .version = 2,
     .write = write,
+};
+
+const weft_exporter weft_exporter_gltf_ktx2 = {
+    .name = "gltf-ktx2",
+    .summary = "the same with KTX2 pictures (UASTC) that carry the filtered mips",
+    .version = 1,
+    .write = write_ktx2,
 };

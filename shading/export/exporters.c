@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-extern const weft_exporter weft_exporter_gltf;
+extern const weft_exporter weft_exporter_gltf, weft_exporter_gltf_ktx2;
 extern const weft_exporter weft_exporter_mtlx;
 extern const weft_exporter weft_exporter_png;
 extern const weft_exporter weft_exporter_u3m;
@@ -17,6 +17,7 @@ extern const weft_exporter weft_exporter_godot, weft_exporter_blender;
 const weft_exporter *const weft_exporters[] = {
     &weft_exporter_png,        //
     &weft_exporter_gltf,       //
+    &weft_exporter_gltf_ktx2,  //
     &weft_exporter_u3m,        //
     &weft_exporter_mtlx,       //
     &weft_exporter_ktx2,       //

@@ -40,8 +40,9 @@ judge() { # NEEDS-FILE COMMAND...
     "$@" >judge.log 2>&1 || { echo "FAILED: $*"; cat judge.log; exit 1; }
 }
 modules=$WEFT_JUDGES/node_modules
-judge "$modules/gltf-validator" node "$judges/judge_gltf.js" ./*.material/gltf/*.glb
+judge "$modules/gltf-validator" node "$judges/judge_gltf.js" ./*.material/gltf*/*.glb
 judge "$modules/@needle-tools/materialx" node "$judges/judge_mtlx.js" ./*.material/mtlx/*.mtlx
+judge "$modules/three" node "$judges/judge_basisu.mjs" pile.material gold.material damp.material
 judge "$modules/ktx-parse" node "$judges/judge_ktx2.mjs" ./*.material/ktx2/*.ktx2
 judge "$shared/data/u3m/u3m1.1/spec/u3m_schema.json" python3 "$judges/judge_u3m.py" \
     "$shared/data/u3m/u3m1.1/spec/u3m_schema.json" ./*.material/u3m
@@ -55,5 +56,5 @@ if [ -e "$modules/gltf-validator" ]; then
 fi
 if [ ${#missing[@]} -gt 0 ]; then
     echo "these judges are not here, the others agree: ${missing[*]}"
-    [ ${#missing[@]} -lt 6 ] || exit 77
+    [ ${#missing[@]} -lt 7 ] || exit 77
 fi
