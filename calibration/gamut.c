@@ -2,6 +2,7 @@
 
 #include "core/colour.h"
 #include "core/linalg.h"
+#include "core/mem_limit.h"
 
 #include <assert.h>
 #include <math.h>
@@ -93,6 +94,8 @@ void weft_gamut_look(const weft_gamut *gamut, int n, const double (*points)[3], 
     *survey = (weft_gamut_survey){0};
     const size_t pixels = weft_image_plane_size(image);
     for (size_t i = 0; i < pixels; i++) {
+        if (i % 65536 == 0)
+            weft_mem_trim();
         if (mask && !mask->data[i])
             continue;
         const double rgb[3] = {(double)image->data[i], (double)image->data[pixels + i],

@@ -1,5 +1,7 @@
 #include "core/mem.h"
 
+#include "core/mem_blocks.h"
+
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -31,7 +33,12 @@ void *weft_alloc(size_t count, size_t size, weft_error *err)
         return NULL;
     }
     bytes = (bytes + 64) / 64 * 64; /* never 0, and whole cache lines as aligned_alloc asks */
+    const weft_mem_place place = weft_mem_choose_place(bytes);
+    if (place == WEFT_MEM_FILE)
+        return weft_mem_file_alloc(bytes, err);
     void *const block = aligned_alloc(64, bytes);
+    if (place == WEFT_MEM_HEAP)
+        weft_mem_note_heap(block, bytes);
     if (!block)
         no_memory(err, count, size);
     else
@@ -39,10 +46,24 @@ void *weft_alloc(size_t count, size_t size, weft_error *err)
     return block;
 }
 
+/* A block that is counted, or in a file, is not realloc()'s. */
+static void *move_known(void *block, size_t known, size_t count, size_t size, weft_error *err)
+{
+    void *const moved = weft_alloc(count, size, err);
+    if (moved) {
+        memcpy(moved, block, known < count * size ? known : count * size);
+        weft_free(block);
+    }
+    return moved;
+}
+
 void *weft_realloc(void *block, size_t count, size_t size, weft_error *err)
 {
     size_t bytes;
     void *grown = NULL;
+    const size_t known = weft_mem_known_bytes(block);
+    if (known)
+        return move_known(block, known, count, size, err);
     if (!__builtin_mul_overflow(count, size, &bytes) && !must_fail())
         grown = realloc(block, bytes ? bytes : 1);
     if (!grown)
@@ -75,5 +96,6 @@ char *weft_asprintf(weft_error *err, const char *format, ...)
 
 void weft_free(void *block)
 {
-    free(block);
+    if (!weft_mem_forget(block))
+        free(block);
 }

@@ -1,5 +1,6 @@
 #include "core/parallel.h"
 
+#include "core/mem_limit.h"
 #include "core/progress.h"
 
 #include <omp.h>
@@ -16,6 +17,7 @@ static void run_bands(int first, int last, int n_rows, weft_rows_fn *fn, void *c
         const int begin = band * WEFT_BAND_ROWS;
         const int end = begin + WEFT_BAND_ROWS < n_rows ? begin + WEFT_BAND_ROWS : n_rows;
         fn(context, band, begin, end);
+        weft_mem_trim();
     }
 }
 

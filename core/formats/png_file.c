@@ -3,6 +3,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 #include <png.h>
 #include <stdio.h>
@@ -218,6 +219,7 @@ static void write_with_libpng(png_job *job, const weft_raster *raster, uint8_t *
     for (int y = 0; y < raster->height; y++) {
         fill_line(line, raster->data + (size_t)y * n, n, raster->bits);
         png_write_row(job->png, line);
+        weft_mem_trim();
     }
     png_write_end(job->png, job->info);
 }
@@ -302,8 +304,11 @@ weft_err weft_png_write_mask(const char *path, const weft_mask *mask, weft_error
     weft_raster raster;
     WEFT_TRY(weft_raster_init(&raster, mask->width, mask->height, 1, 8, err));
     const size_t n = (size_t)mask->width * (size_t)mask->height;
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         raster.data[i] = mask->data[i] ? 255 : 0;
+        if (i % 65536 == 0)
+            weft_mem_trim();
+    }
     const weft_err status = weft_png_write(path, &raster, err);
     weft_raster_fini(&raster);
     return status;
@@ -330,8 +335,11 @@ weft_err weft_png_write_bytes(const char *path, const weft_mask *bytes, weft_err
     weft_raster raster;
     WEFT_TRY(weft_raster_init(&raster, bytes->width, bytes->height, 1, 8, err));
     const size_t n = (size_t)bytes->width * (size_t)bytes->height;
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         raster.data[i] = bytes->data[i];
+        if (i % 65536 == 0)
+            weft_mem_trim();
+    }
     const weft_err status = weft_png_write(path, &raster, err);
     weft_raster_fini(&raster);
     return status;

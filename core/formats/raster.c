@@ -2,6 +2,7 @@
 
 #include "core/colour.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 weft_err weft_raster_init(weft_raster *raster, int width, int height, int channels, int bits, weft_error *err)
 {
@@ -47,13 +48,14 @@ weft_err weft_image_from_raster(weft_image *image, const weft_raster *raster, we
     weft_image made;
     const weft_err status = weft_image_init(&made, raster->width, raster->height, planes, err);
     if (status == WEFT_OK) {
-        const size_t n = weft_image_plane_size(&made), step = (size_t)raster->channels;
-        for (int p = 0; p < planes; p++) {
-            float *const plane = weft_image_plane(&made, p);
-            const uint16_t *const from = raster->data + p;
-            for (size_t i = 0; i < n; i++)
-                plane[i] = table[from[i * step]];
-        }
+        const size_t width = (size_t)raster->width, step = (size_t)raster->channels;
+        for (int v = 0; v < raster->height; v++, weft_mem_trim())
+            for (int p = 0; p < planes; p++) {
+                float *const row = weft_image_row(&made, p, v);
+                const uint16_t *const from = raster->data + (size_t)v * width * step + (size_t)p;
+                for (size_t i = 0; i < width; i++)
+                    row[i] = table[from[i * step]];
+            }
         *image = made;
     }
     weft_free(table);
@@ -77,14 +79,15 @@ weft_err weft_raster_from_image(weft_raster *raster, const weft_image *image, in
         return weft_fail(err, WEFT_ERR_RANGE, "a picture file holds 1 or 3 planes, not %d", image->planes);
     weft_raster made;
     WEFT_TRY(weft_raster_init(&made, image->width, image->height, image->planes, bits, err));
-    const size_t n = weft_image_plane_size(image), step = (size_t)image->planes;
+    const size_t width = (size_t)image->width, step = (size_t)image->planes;
     const double top = (1 << bits) - 1;
-    for (int p = 0; p < image->planes; p++) {
-        const float *const plane = weft_image_plane(image, p);
-        uint16_t *const to = made.data + p;
-        for (size_t i = 0; i < n; i++)
-            to[i * step] = encode(plane[i], top, transfer);
-    }
+    for (int v = 0; v < image->height; v++, weft_mem_trim())
+        for (int p = 0; p < image->planes; p++) {
+            const float *const row = weft_image_row(image, p, v);
+            uint16_t *const to = made.data + (size_t)v * width * step + (size_t)p;
+            for (size_t i = 0; i < width; i++)
+                to[i * step] = encode(row[i], top, transfer);
+        }
     *raster = made;
     return WEFT_OK;
 }

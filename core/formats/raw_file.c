@@ -2,6 +2,7 @@
 
 #include "core/file.h"
 #include "core/formats/tiff_extent.h"
+#include "core/mem_limit.h"
 
 #include <libraw.h>
 #include <math.h>
@@ -138,7 +139,7 @@ static weft_err copy_visible(const libraw_data_t *raw, const char *path, weft_mo
     if (status != WEFT_OK)
         return weft_prefix(err, status, "%s", path);
     const size_t pitch = s->raw_pitch / sizeof(uint16_t);
-    for (int y = 0; y < height; y++)
+    for (int y = 0; y < height; y++, weft_mem_trim())
         memcpy(mosaic->data + (size_t)y * (size_t)width,
                raw->rawdata.raw_image + (size_t)(s->top_margin + y) * pitch + s->left_margin,
                (size_t)width * sizeof(uint16_t));
@@ -200,6 +201,7 @@ static weft_err read_raw(const char *path, const void *bytes, size_t n, weft_mos
                          weft_frame_info *info, weft_error *err)
 {
     bool damaged = false;
+    weft_mem_give_back(); /* LibRaw's copy of the frame is not ours to keep in a file */
     libraw_data_t *const raw = libraw_init(0);
     if (!raw)
         return weft_fail(err, WEFT_ERR_NOMEM, "%s: no memory for LibRaw", path);

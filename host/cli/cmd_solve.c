@@ -5,6 +5,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 #include "core/progress.h"
 #include "host/solve/albedo_gamut.h"
 #include "host/solve/finish.h"
@@ -93,7 +94,7 @@ static const weft_field fields[] = {
      .min = 0.01,
      .max = 4096,
      .def = "2",
-     .help = "memory that may be used; a set that needs more is refused before it is read"},
+     .help = "memory that may be used; what does not fit is kept in a file in $TMPDIR or /var/tmp meanwhile"},
     {.key = "shadow",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(solve_args, shadow),
@@ -259,6 +260,7 @@ static weft_err solve_one(const weft_invocation *inv, const solve_args *args, in
         status = weft_maps_save(path, &maps, inv->force, err);
     if (status == WEFT_OK) {
         const double seconds = weft_clock_s() - begun;
+        weft_explain("memory: %.0f MiB at most", weft_mem_peak() / 1048576);
         json_array_append_new(summaries, summary_of(inv->operands[i], path, &maps, seconds));
         if (!inv->json)
             print_summary(inv, path, &maps, seconds);
@@ -282,6 +284,7 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
                                   .mm_per_px = args->mm_per_px,
                                   .height_mm = args->thickness_mm,
                                   .shadow = args->shadow};
+    weft_mem_set_limit(options.memory_bytes);
     WEFT_TRY(weft_solve_find_method(args->method, &options.method, err));
     if (args->explain.n > 0 && inv->n_operands > 1)
         return weft_fail(err, WEFT_ERR_USAGE, "--explain is for one set");

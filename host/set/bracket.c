@@ -1,6 +1,7 @@
 #include "host/set/bracket.h"
 
 #include "core/mem.h"
+#include "core/mem_limit.h"
 #include "core/parallel.h"
 
 #include <math.h>
@@ -75,10 +76,12 @@ static void add_rows(void *context, int band, int row_begin, int row_end)
 /* Divides, and takes photosites that no exposure holds from `shortest`: saturated, but the best there is. */
 static void merge_finish(merge *m, weft_plate *shortest)
 {
-    const size_t n = weft_image_plane_size(&m->value), all = n * (size_t)m->value.planes;
-    for (size_t i = 0; i < all; i++)
-        if (m->weight.data[i] > 0)
-            shortest->image.data[i] = m->value.data[i] / m->weight.data[i];
+    const size_t n = weft_image_plane_size(&m->value), width = (size_t)m->value.width;
+    const size_t rows = (size_t)m->value.height * (size_t)m->value.planes;
+    for (size_t v = 0; v < rows; v++, weft_mem_trim())
+        for (size_t i = v * width; i < (v + 1) * width; i++)
+            if (m->weight.data[i] > 0)
+                shortest->image.data[i] = m->value.data[i] / m->weight.data[i];
     for (size_t i = 0; i < n; i++)
         shortest->clipped.data[i] = m->weight.data[i] > 0 ? 0 : 255;
 }

@@ -6,6 +6,7 @@
 #include "core/formats/png_file.h"
 #include "core/json.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 #include <math.h>
 #include <string.h>
@@ -79,14 +80,16 @@ static weft_err write_normal_png(const char *path, const weft_image *normal, wef
 {
     weft_raster raster;
     WEFT_TRY(weft_raster_init(&raster, normal->width, normal->height, 3, 16, err));
-    const size_t n = weft_image_plane_size(normal);
-    for (int p = 0; p < 3; p++) {
-        const float *const plane = weft_image_plane(normal, p);
-        for (size_t i = 0; i < n; i++) {
-            const double code = 32767.5 + 32767.5 * fmin(fmax((double)plane[i], -1), 1);
-            raster.data[3 * i + (size_t)p] = isfinite(plane[i]) ? (uint16_t)lround(code) : 32768;
+    const size_t n = (size_t)normal->width;
+    for (int v = 0; v < normal->height; v++, weft_mem_trim())
+        for (int p = 0; p < 3; p++) {
+            const float *const row = weft_image_row(normal, p, v);
+            uint16_t *const to = raster.data + 3 * n * (size_t)v + (size_t)p;
+            for (size_t i = 0; i < n; i++) {
+                const double code = 32767.5 + 32767.5 * fmin(fmax((double)row[i], -1), 1);
+                to[3 * i] = isfinite(row[i]) ? (uint16_t)lround(code) : 32768;
+            }
         }
-    }
     const weft_err status = weft_png_write(path, &raster, err);
     weft_raster_fini(&raster);
     return status;

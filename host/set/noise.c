@@ -1,6 +1,7 @@
 #include "host/set/noise.h"
 
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -57,6 +58,8 @@ double weft_noise_floor(const weft_image *image, int step)
     for (size_t i = 0; i < n; i++) {
         const size_t at = i * stride;
         blocks[i] = measure_block(image, step, (int)(at % across) * BLOCK, (int)(at / across) * BLOCK);
+        if (i % 64 == 0)
+            weft_mem_trim();
     }
     qsort(blocks, n, sizeof *blocks, by_mean);
     const size_t n_dark = (n + 9) / 10;

@@ -3,6 +3,7 @@
 #include "core/file.h"
 #include "core/formats/png_file.h"
 #include "core/mem.h"
+#include "core/parallel.h"
 #include "host/set/bracket.h"
 #include "host/set/frame_file.h"
 
@@ -53,6 +54,27 @@ static weft_err load_role(const weft_set *set, weft_frame_role role, int light, 
 
 /* ---- what others call ---- */
 
+typedef struct difference {
+    weft_plate *plate;
+    const weft_plate *ambient;
+} difference;
+
+static void subtract_rows(void *context, int band, int row_begin, int row_end)
+{
+    const difference *const d = context;
+    const weft_image *const a = &d->plate->image, *const b = &d->ambient->image;
+    const size_t begin = (size_t)row_begin * (size_t)a->width, end = (size_t)row_end * (size_t)a->width;
+    (void)band;
+    for (int p = 0; p < a->planes; p++) {
+        float *const from = weft_image_plane(a, p);
+        const float *const what = weft_image_plane(b, p);
+        for (size_t i = begin; i < end; i++)
+            from[i] -= what[i];
+    }
+    for (size_t i = begin; i < end; i++)
+        d->plate->clipped.data[i] |= d->ambient->clipped.data[i];
+}
+
 static weft_err subtract(weft_plate *plate, const weft_plate *ambient, const weft_set *set, weft_error *err)
 {
     const weft_image *const a = &plate->image, *const b = &ambient->image;
@@ -61,11 +83,8 @@ static weft_err subtract(weft_plate *plate, const weft_plate *ambient, const wef
         return weft_fail(err, WEFT_ERR_MISMATCH,
                          "%s: the ambient plate is %d x %d x %d, the light %d x %d x %d", set->folder,
                          b->width, b->height, b->planes, a->width, a->height, a->planes);
-    const size_t n = weft_image_plane_size(a);
-    for (size_t i = 0; i < n * (size_t)a->planes; i++)
-        a->data[i] -= b->data[i];
-    for (size_t i = 0; i < n; i++)
-        plate->clipped.data[i] |= ambient->clipped.data[i];
+    difference d = {plate, ambient};
+    weft_parallel_rows(a->height, subtract_rows, &d);
     return WEFT_OK;
 }
 

@@ -1,6 +1,7 @@
 #include "host/solve/bounce.h"
 
 #include "core/clones.h"
+#include "core/mem_limit.h"
 #include "core/parallel.h"
 #include "shading/bake/height_poisson.h"
 
@@ -58,7 +59,7 @@ static void find_means(bounce_job *job)
 {
     const weft_maps *const m = job->maps;
     double sum[3] = {0}, n[3] = {0};
-    for (int v = 0; v < m->height; v++)
+    for (int v = 0; v < m->height; v++, weft_mem_trim())
         for (int u = 0; u < m->width; u++) {
             if (!m->mask.data[(size_t)v * (size_t)m->width + (size_t)u])
                 continue;

@@ -3,6 +3,7 @@
 #include "core/file.h"
 #include "core/json.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 #include "core/sha256.h"
 #include "core/version.h"
 
@@ -79,16 +80,17 @@ static json_t *drift_json(const weft_solve_run *run)
 
 static json_t *result_json(const weft_maps *maps, const weft_solve_run *run)
 {
-    const size_t n = (size_t)maps->width * (size_t)maps->height;
+    const size_t width = (size_t)maps->width;
     size_t answered = 0;
     double residual = 0, confidence = 0, uncertainty = 0;
-    for (size_t i = 0; i < n; i++)
-        if (maps->mask.data[i]) {
-            answered++;
-            residual += (double)maps->residual.data[i];
-            confidence += (double)maps->confidence.data[i];
-            uncertainty += (double)maps->uncertainty.data[i];
-        }
+    for (size_t v = 0; v < (size_t)maps->height; v++, weft_mem_trim())
+        for (size_t i = v * width; i < (v + 1) * width; i++)
+            if (maps->mask.data[i]) {
+                answered++;
+                residual += (double)maps->residual.data[i];
+                confidence += (double)maps->confidence.data[i];
+                uncertainty += (double)maps->uncertainty.data[i];
+            }
     const double count = answered ? (double)answered : 1;
     json_t *const result =
         json_pack("{s:i, s:i, s:I, s:f, s:f, s:f}", "width", maps->width, "height", maps->height,

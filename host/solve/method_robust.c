@@ -225,26 +225,32 @@ WEFT_INLINE void try_all(const weft_solve_samples *s, const scaled_light *scaled
             }
 }
 
-/* Of many lights' triples every so many, in a fixed order. */
+/* Of many lights' triples every so many, in the order (0, 1, 2), (0, 1, 3), ..., of which only the ones that
+ * are tried are come by: the triples that begin with i, or with i and j, are stepped over together. */
 WEFT_INLINE void try_some(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
 {
     const long n = s->n_lights, all = n * (n - 1) * (n - 2) / 6;
-    long next = all / (2L * MOST_TRIPLES), number = 0, tried = 0;
-    for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++) {
-            for (int l = j + 1; l < n; l++, number++) {
-                lane_vectors ij, il, jl;
-                if (number != next)
-                    continue;
-                cross(&s->at[i], &s->at[j], &ij);
-                cross(&s->at[i], &s->at[l], &il);
-                cross(&s->at[j], &s->at[l], &jl);
-                const triple t = {i, j, l, &ij, &il, &jl};
-                try_triple(s, scaled, &t, best);
-                tried++;
-                next = (2 * tried + 1) * all / (2L * MOST_TRIPLES);
-            }
+    long i = 0, j = 1, of_i = 0, of_j = 0; /* the numbers of the first triples with i, and with i and j */
+    for (long tried = 0; tried < MOST_TRIPLES; tried++) {
+        const long number = (2 * tried + 1) * all / (2L * MOST_TRIPLES);
+        while (number >= of_i + (n - 1 - i) * (n - 2 - i) / 2) {
+            of_i += (n - 1 - i) * (n - 2 - i) / 2;
+            i++;
+            of_j = of_i;
+            j = i + 1;
         }
+        while (number >= of_j + n - 1 - j) {
+            of_j += n - 1 - j;
+            j++;
+        }
+        const int l = (int)(j + 1 + number - of_j);
+        lane_vectors ij, il, jl;
+        cross(&s->at[i], &s->at[j], &ij);
+        cross(&s->at[i], &s->at[l], &il);
+        cross(&s->at[j], &s->at[l], &jl);
+        const triple t = {(int)i, (int)j, l, &ij, &il, &jl};
+        try_triple(s, scaled, &t, best);
+    }
 }
 
 /* Samples within three sigma of the best candidate; all that were not dark where there is none, or where

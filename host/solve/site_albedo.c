@@ -70,16 +70,30 @@ static weft_err fill_holes(weft_image *mosaic, const weft_mask *mask, weft_error
     return status;
 }
 
+typedef struct copy_job {
+    const weft_image *from;
+    weft_image *to;
+} copy_job;
+
+/* Plane 0. */
+static void copy_rows(void *context, int band, int row_begin, int row_end)
+{
+    const copy_job *const job = context;
+    (void)band;
+    memcpy(weft_image_row(job->to, 0, row_begin), weft_image_row(job->from, 0, row_begin),
+           (size_t)(row_end - row_begin) * (size_t)job->to->width * sizeof(float));
+}
+
 weft_err weft_site_albedo_finish(weft_maps *maps, weft_cfa cfa, weft_site_done_fn *done, void *context,
                                  weft_error *err)
 {
-    const size_t n = weft_image_plane_size(&maps->albedo);
     weft_image mosaic = {0};
     WEFT_TRY(weft_site_require_size(maps->width, maps->height, err));
     WEFT_TRY(weft_image_init(&mosaic, maps->width, maps->height, 1, err));
-    memcpy(mosaic.data, maps->albedo.data, n * sizeof *mosaic.data);
+    copy_job copy = {&maps->albedo, &mosaic};
+    weft_parallel_rows(maps->height, copy_rows, &copy);
     weft_err status = WEFT_OK;
-    if (memchr(maps->mask.data, 0, n))
+    if (memchr(maps->mask.data, 0, weft_image_plane_size(&mosaic)))
         status = fill_holes(&mosaic, &maps->mask, err);
     if (status == WEFT_OK)
         weft_site_demosaic_into(&mosaic, cfa, &maps->albedo, done, context);

@@ -1,6 +1,7 @@
 #include "host/solve/solve.h"
 
 #include "core/log.h"
+#include "core/mem_limit.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "host/solve/albedo_gamut.h"
@@ -39,29 +40,21 @@ static bool has_near_light(const weft_calibration *cal)
     return false;
 }
 
-/* Bytes at the worst moment: while rows are solved, all lights and the maps; afterwards the maps, and either
- * what demosaicing the albedo takes or the maps on the plane.  Reading needs the ambient plate and a frame
- * beside. */
-static double bytes_needed(const weft_set *set, const weft_solve_options *options)
+/* What cannot be kept in files: the program, and what LibRaw and we make of one frame. */
+static double bytes_needed(const weft_set *set)
 {
-    const double shrink = options->half ? 4 : 1, pixels = (double)set->width * set->height / shrink;
-    const int n = weft_set_n_lights(set);
-    const double sites = set->cfa != WEFT_CFA_NONE && !options->half && !options->linear ? 1 : 3;
-    const double plates = pixels * n * (4 * sites + 1), maps = pixels * 39,
-                 frame = (double)set->width * set->height * 14;
-    return fmax(plates + fmax(maps, frame), 2.2 * maps) + 64e6;
+    return WEFT_MEM_LEAST_LIMIT + 6.0 * set->width * set->height;
 }
 
 static weft_err require_memory(const weft_set *set, const weft_solve_options *options, weft_error *err)
 {
-    const double needed = bytes_needed(set, options);
+    const double needed = bytes_needed(set);
     if (!(options->memory_bytes > 0) || needed <= options->memory_bytes)
         return WEFT_OK;
     return weft_fail(err, WEFT_ERR_NOMEM,
-                     "%s: %d lights of %d x %d pixels need %.2f GiB, %.2f are allowed (give --memory %.1f%s)",
-                     set->folder, weft_set_n_lights(set), set->width, set->height, needed / 1073741824.0,
-                     options->memory_bytes / 1073741824.0, ceil(needed / 107374182.4) / 10,
-                     options->half ? "" : ", or --resolution half");
+                     "%s: frames of %d x %d pixels need %.2f GiB, %.2f are allowed (give --memory %.2f)",
+                     set->folder, set->width, set->height, needed / 1073741824.0,
+                     options->memory_bytes / 1073741824.0, ceil(needed / 10737418.24) / 100);
 }
 
 weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, const char *cal_folder,

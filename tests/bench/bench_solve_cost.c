@@ -1,8 +1,9 @@
 /*
- * What a picture costs against its size and the number of lights, as text and as two SVG files: straight
- * lines.
+ * What a picture costs against its size and the number of lights, from the decoded planes to normals and
+ * three albedo planes, as text and as SVG files: dots measured, lines the straight ones that fit them best.
  *
- *     bench_solve_cost [FOLDER]     writes solve-cost-size.svg and solve-cost-lights.svg into FOLDER
+ *     bench_solve_cost [FOLDER]     writes solve-cost-{size,lights}.svg and search-cost-{size,lights}.svg
+ * there
  */
 #include "core/file.h"
 #include "core/parallel.h"
@@ -12,7 +13,10 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { ROUNDS = 5, POINTS = 8, METHODS = 3 };
+enum { ROUNDS = 5, POINTS = 8, METHODS = 3, SEARCH = 2 };
+
+/* Up to here the search tries every triple of lights, whose number grows with the cube; then always 220. */
+enum { ALL_TRIPLES = 12 };
 
 typedef struct curve {
     double x[POINTS], seconds[METHODS][POINTS];
@@ -28,9 +32,11 @@ static void measure_point(curve *c, double x, int width, int height, int n)
     c->x[c->n] = x;
     for (int m = 0; m < METHODS; m++) {
         double least = (double)NAN;
-        for (int round = 0; round < ROUNDS; round++)
-            work_take_less(&least,
-                           work_solve_ns(&w, m == 0 ? &weft_method_lsq : &weft_method_robust, NULL, m == 2));
+        for (int round = 0; round < ROUNDS; round++) {
+            const weft_solve_method *const method = m == 0 ? &weft_method_lsq : &weft_method_robust;
+            const double ns = work_solve_ns(&w, method, NULL, m == SEARCH);
+            work_take_less(&least, ns + work_demosaic_ns(&w));
+        }
         c->seconds[m][c->n] = least * 1e-9 * width * height;
     }
     printf("%8.2f", x);
@@ -41,41 +47,56 @@ static void measure_point(curve *c, double x, int width, int height, int n)
     work_fini(&w);
 }
 
-/* Largest distance of the points from the straight line fitted to them, relative to the last point. */
-static double bend(const curve *c, int m)
+typedef struct straight {
+    double base, slope;
+    double bend; /* largest distance of a point, relative to the last one */
+} straight;
+
+/* The line that fits the points from x = `from` on. */
+static straight fit(const curve *c, int m, double from)
 {
-    double sx = 0, sy = 0, sxx = 0, sxy = 0, worst = 0;
+    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    straight s = {0};
     for (int i = 0; i < c->n; i++) {
-        sx += c->x[i], sy += c->seconds[m][i];
-        sxx += c->x[i] * c->x[i], sxy += c->x[i] * c->seconds[m][i];
+        const double w = c->x[i] >= from ? 1 : 0;
+        n += w, sx += w * c->x[i], sy += w * c->seconds[m][i];
+        sxx += w * c->x[i] * c->x[i], sxy += w * c->x[i] * c->seconds[m][i];
     }
-    const double slope = (c->n * sxy - sx * sy) / (c->n * sxx - sx * sx), base = (sy - slope * sx) / c->n;
+    s.slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+    s.base = (sy - s.slope * sx) / n;
     for (int i = 0; i < c->n; i++)
-        worst = fmax(worst, fabs(c->seconds[m][i] - base - slope * c->x[i]));
-    return worst / c->seconds[m][c->n - 1];
+        if (c->x[i] >= from)
+            s.bend = fmax(s.bend, fabs(c->seconds[m][i] - s.base - s.slope * c->x[i]));
+    s.bend /= c->seconds[m][c->n - 1];
+    return s;
 }
 
+/* Methods `first` to `last` of a curve into FOLDER/NAME. */
 static int draw(const curve *c, const char *title, const char *label, const char *folder, const char *name,
-                int n_methods)
+                int first, int last, double from)
 {
     char path[1024];
     weft_plot plot;
     weft_text_buffer text = {0};
     double most = 0;
-    for (int m = 0; m < n_methods; m++)
+    for (int m = first; m <= last; m++)
         most = fmax(most, c->seconds[m][c->n - 1]);
     const weft_plot_spec spec = {.title = title,
-                                 .width = 560,
-                                 .height = 360,
+                                 .width = 460,
+                                 .height = 300,
                                  .x = {label, 0, c->x[c->n - 1] * 1.03, false},
-                                 .y = {"seconds, one core", 0, most * 1.05, false},
+                                 .y = {"seconds, one core", 0, most * 1.1, false},
                                  .legend_rows = 1,
                                  .standalone = true};
     weft_plot_begin(&plot, &spec, &text);
-    for (int m = 0; m < n_methods; m++) {
-        weft_plot_line(&plot, m, c->n, c->x, c->seconds[m], method_names[m]);
+    for (int m = first; m <= last; m++) {
+        const straight s = fit(c, m, from);
+        const double x[2] = {fmax(from, 0), c->x[c->n - 1]},
+                     y[2] = {s.base + s.slope * x[0], s.base + s.slope * x[1]};
+        weft_plot_line(&plot, m, 2, x, y, method_names[m]);
         weft_plot_dots(&plot, m, 3, c->n, c->x, c->seconds[m], NULL);
-        printf("%s: %.1f %% off a straight line at most\n", method_names[m], 100 * bend(c, m));
+        printf("%s over %s: %.1f %% of the last off a straight line at most\n", method_names[m], label,
+               100 * s.bend);
     }
     weft_plot_end(&plot);
     snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -100,11 +121,14 @@ int main(int argc, char **argv)
     for (int i = 0; i < 6; i++)
         measure_point(&size, sides[i][0] * sides[i][1] * 1e-6, sides[i][0], sides[i][1], 10);
     if (argc > 1)
-        failed |= draw(&size, "Ten lights", "megapixels", argv[1], "solve-cost-size.svg", METHODS);
+        failed |= draw(&size, "Ten lights", "megapixels", argv[1], "solve-cost-size.svg", 0, SEARCH - 1, 0) |
+                  draw(&size, "Ten lights", "megapixels", argv[1], "search-cost-size.svg", SEARCH, SEARCH, 0);
     printf("lights    lsq          robust, matte  all searched   (1 Mpixel)\n");
     for (int i = 0; i < 8; i++)
         measure_point(&number, lights[i], 1232, 816, lights[i]);
     if (argc > 1)
-        failed |= draw(&number, "1 megapixel", "lights", argv[1], "solve-cost-lights.svg", 2);
+        failed |= draw(&number, "1 megapixel", "lights", argv[1], "solve-cost-lights.svg", 0, SEARCH - 1, 0) |
+                  draw(&number, "1 megapixel", "lights", argv[1], "search-cost-lights.svg", SEARCH, SEARCH,
+                       ALL_TRIPLES);
     return failed;
 }

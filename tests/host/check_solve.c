@@ -4,6 +4,7 @@
 #include "core/file.h"
 #include "core/formats/png_file.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "host/set/compare.h"
@@ -196,10 +197,13 @@ static void test_maps_say_how_they_were_made(void **state)
     weft_maps_fini(&back);
 }
 
+/* On 1, 2 and 4 threads, with all memory there is, and with all planes in files that are given back after
+ * each band. */
 static void test_mask_and_same_bits(void **state)
 {
     (void)state;
     static const int threads[] = {1, 2, 4};
+    static const double limits[] = {0, 1, 0};
     weft_mask mask;
     weft_maps maps[3] = {{0}};
     assert_ok(weft_mask_init(&mask, WIDTH, HEIGHT, 255, err));
@@ -212,8 +216,10 @@ static void test_mask_and_same_bits(void **state)
         const weft_solve_options options = {.method = weft_solve_methods[m]};
         for (int i = 0; i < 3; i++) {
             weft_parallel_set_threads(threads[i]);
+            weft_mem_set_limit(limits[i]);
             weft_maps_fini(&maps[i]);
             assert_ok(solve_with(&made, &options, &maps[i], err));
+            assert_true(limits[i] == 0 || weft_mem_in_files() > 0);
             const size_t n = weft_image_plane_size(&maps[0].normal);
             assert_memory_equal(maps[0].normal.data, maps[i].normal.data, 3 * n * sizeof(float));
             assert_memory_equal(maps[0].albedo.data, maps[i].albedo.data, 3 * n * sizeof(float));
@@ -223,6 +229,7 @@ static void test_mask_and_same_bits(void **state)
             assert_memory_equal(maps[0].quality.data, maps[i].quality.data, n);
         }
     }
+    weft_mem_set_limit(0);
     weft_parallel_set_threads(0);
     weft_solve_options sensor = {.sensor_geometry = true};
     weft_maps_fini(&maps[1]);
