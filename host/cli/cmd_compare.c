@@ -54,6 +54,42 @@ static void print_spread(FILE *out, const char *what, const char *unit, const we
 
 /* ---- maps ---- */
 
+static const char *const flaw_names[WEFT_N_FLAWS] = {"tears", "creases", "lint"};
+
+static double share(size_t part, size_t whole)
+{
+    return whole ? (double)part / (double)whole : (double)NAN;
+}
+
+static json_t *share_json(size_t part, size_t whole)
+{
+    return whole ? json_real(share(part, whole)) : json_null();
+}
+
+static json_t *flaws_json(const weft_maps_difference *d)
+{
+    json_t *const o = json_object();
+    for (int k = 0; k < WEFT_N_FLAWS; k++) {
+        const weft_flaw_match *const m = &d->flaws[k];
+        json_object_set_new(o, flaw_names[k],
+                            json_pack("{s:I, s:I, s:o, s:o}", "a_px", (json_int_t)m->a, "b_px",
+                                      (json_int_t)m->b, "precision", share_json(m->hits, m->a), "recall",
+                                      share_json(m->found, m->b)));
+    }
+    return o;
+}
+
+static void print_flaws(FILE *out, const weft_maps_difference *d)
+{
+    for (int k = 0; k < WEFT_N_FLAWS; k++) {
+        const weft_flaw_match *const m = &d->flaws[k];
+        if (m->a || m->b)
+            fprintf(out,
+                    "%-16s %zu px in A, %.1f %% of them near B's; %zu px in B, %.1f %% of them near A's\n",
+                    flaw_names[k], m->a, 100 * share(m->hits, m->a), m->b, 100 * share(m->found, m->b));
+    }
+}
+
 static weft_err print_maps(const weft_invocation *inv, const weft_maps_difference *d, weft_error *err)
 {
     if (inv->json) {
@@ -70,6 +106,12 @@ static weft_err print_maps(const weft_invocation *inv, const weft_maps_differenc
             json_object_set_new(o, "albedo_luminance", spread_json(&d->luminance));
             json_object_set_new(o, "albedo_is_camera_rgb", json_boolean(d->albedo_is_camera_rgb));
         }
+        if (d->has_alpha) {
+            json_object_set_new(o, "alpha", spread_json(&d->alpha));
+            json_object_set_new(o, "cover", json_pack("[f,f]", d->cover[0], d->cover[1]));
+        }
+        if (d->has_flaws)
+            json_object_set_new(o, "flaws", flaws_json(d));
         return weft_print_json(inv, o, err);
     }
     if (d->has_normal) {
@@ -81,6 +123,12 @@ static weft_err print_maps(const weft_invocation *inv, const weft_maps_differenc
         print_spread(inv->out, "albedo dE2000", "", &d->delta_e);
         print_spread(inv->out, "albedo luminance", "relative", &d->luminance);
     }
+    if (d->has_alpha) {
+        print_spread(inv->out, "alpha", "where open", &d->alpha);
+        fprintf(inv->out, "%-16s %.4f of A, %.4f of B\n", "covered", d->cover[0], d->cover[1]);
+    }
+    if (d->has_flaws)
+        print_flaws(inv->out, d);
     if (d->only_a || d->only_b)
         fprintf(inv->out, "%-16s %zu px in A, %zu px in B\n", "in one alone", d->only_a, d->only_b);
     return WEFT_OK;
@@ -228,10 +276,13 @@ const weft_command weft_cmd_compare = {
     .max_operands = 2,
     .args_size = sizeof(compare_args),
     .fields = fields,
-    .details = "Maps: the angle between the normals, CIEDE2000 and relative luminance of the albedo.  Plane\n"
-               "maps of one scale are laid over each other by their origins.  Pictures (PNG, TIFF as\n"
-               "sRGB, EXR as linear): PSNR of the sRGB codes and CIEDE2000.  Calibrations: lights,\n"
-               "camera, pose and colour.",
+    .details =
+        "Maps: the angle between the normals, CIEDE2000 and relative luminance of the albedo.  Alpha and\n"
+        "flaws where both have them: of A's flags the share that lies near one of B's, and the other\n"
+        "way round (0.5 mm, creases 2 mm).  Plane maps of one scale are laid over each other by their "
+        "origins.  Pictures (PNG, TIFF as\n"
+        "sRGB, EXR as linear): PSNR of the sRGB codes and CIEDE2000.  Calibrations: lights,\n"
+        "camera, pose and colour.",
     .example = "weft compare twill.maps truth/plane.maps",
     .run = run,
 };

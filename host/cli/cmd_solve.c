@@ -8,7 +8,9 @@
 #include "core/mem_limit.h"
 #include "core/progress.h"
 #include "host/solve/albedo_gamut.h"
+#include "host/solve/alpha.h"
 #include "host/solve/finish.h"
+#include "host/solve/flaws.h"
 #include "host/solve/solve.h"
 
 #include <string.h>
@@ -16,8 +18,9 @@
 typedef struct solve_args {
     const char *calibration, *output, *method, *explain_plot;
     weft_numbers explain;
-    double flatten_mm;
+    double flatten_mm, ground;
     int height;
+    bool flaws;
     int geometry, resolution, gloss, bounce;
     double mm_per_px, thickness_mm, shadow, memory_gib;
 } solve_args;
@@ -119,6 +122,20 @@ static const weft_field fields[] = {
      .max = 10000,
      .def = "0",
      .help = "take bends longer than this off the normals, for detail maps; 0: leave them"},
+    {.key = "ground",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(solve_args, ground),
+     .unit = "part",
+     .min = 0,
+     .max = 0.25,
+     .def = "0",
+     .help =
+         "also write alpha.exr, the holes of lace: the sample lies on a ground of this reflectance, 0.02 for "
+         "black velvet; 0: no holes"},
+    {.key = "flaws",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(solve_args, flaws),
+     .help = "also write flaws.png: creases, lint, and with --ground tears"},
     {.key = "explain",
      .type = WEFT_FIELD_F64S,
      .offset = offsetof(solve_args, explain),
@@ -220,6 +237,23 @@ static json_t *summary_of(const char *set, const char *path, const weft_maps *ma
                      "seconds", seconds, "info", maps->info);
 }
 
+static void print_flaws(const weft_invocation *inv, const char *path, json_t *flaws)
+{
+    const char *name, *between = "";
+    json_t *found;
+    if (!flaws)
+        return;
+    fprintf(inv->out, "%s:", path);
+    json_object_foreach(flaws, name, found)
+    {
+        fprintf(inv->out, "%s %s %d (%.1f mm2)", between, name,
+                (int)json_integer_value(json_object_get(found, "n")),
+                json_number_value(json_object_get(found, "area_mm2")));
+        between = ",";
+    }
+    fprintf(inv->out, "\n");
+}
+
 static void print_summary(const weft_invocation *inv, const char *path, const weft_maps *maps, double seconds)
 {
     const json_t *const result = json_object_get(maps->info, "result");
@@ -231,10 +265,21 @@ static void print_summary(const weft_invocation *inv, const char *path, const we
             100 * answered / ((double)maps->width * maps->height),
             100 * json_number_value(json_object_get(result, "residual_mean")),
             json_number_value(json_object_get(result, "confidence_mean")), seconds);
+    print_flaws(inv, path, json_object_get(result, "flaws"));
     char words[256];
     weft_albedo_gamut_words(maps, words, sizeof words);
     if (words[0])
         fprintf(inv->out, "%s: %s\n", path, words);
+}
+
+/* Before the bends are taken off: a crease is one. */
+static weft_err look_for_flaws(const solve_args *args, weft_maps *maps, weft_error *err)
+{
+    if (args->ground > 0) {
+        WEFT_TRY(weft_maps_find_alpha(maps, args->ground, err));
+        json_object_set_new(json_object_get(maps->info, "options"), "ground", json_real(args->ground));
+    }
+    return args->flaws ? weft_maps_find_flaws(maps, NULL, err) : WEFT_OK;
 }
 
 static weft_err solve_one(const weft_invocation *inv, const solve_args *args, int i,
@@ -250,6 +295,8 @@ static weft_err solve_one(const weft_invocation *inv, const solve_args *args, in
         status = weft_set_load(inv->operands[i], &set, err);
     if (status == WEFT_OK)
         status = weft_solve_set(&set, cal, args->calibration, options, &maps, err);
+    if (status == WEFT_OK)
+        status = look_for_flaws(args, &maps, err);
     if (status == WEFT_OK && args->flatten_mm > 0) {
         status = weft_maps_flatten(&maps, args->flatten_mm, err);
         json_object_set_new(json_object_get(maps.info, "options"), "flatten_mm", json_real(args->flatten_mm));

@@ -33,6 +33,7 @@ typedef struct yarn_system {
     bool is_warp;
     int n;
     double pitch_mm, other_pitch_mm, bulge_mm, crimp_mm;
+    double cover, reach; /* width over pitch; half widths from a yarn's middle at which it still counts */
     const char *sett;
     yarn yarns[MAX_YARNS];
     yarn_place *places; /* [n][N] */
@@ -135,7 +136,7 @@ static void place_yarn(const weft_weave *weave, yarn_system *system, int k)
             .centre_mm =
                 (float)((k + 0.5) * system->pitch_mm + y->wobble_mm[0] * sin(2 * turn + y->wobble_phase[0]) +
                         y->wobble_mm[1] * sin(5 * turn + y->wobble_phase[1])),
-            .half_width_mm = (float)(0.5 * system->pitch_mm * y->width * slub),
+            .half_width_mm = (float)(0.5 * system->pitch_mm * system->cover * y->width * slub),
             .sagitta_mm = (float)(system->bulge_mm * y->bulge * slub),
             .axis_mm = (float)(system->crimp_mm * y->crimp * (before + (after - before) * blend)),
         };
@@ -153,7 +154,7 @@ static on_yarn highest_yarn(const yarn_system *system, int along, double across)
         const double centre = (double)place->centre_mm + (i - k) * system->pitch_mm;
         const double half_width = (double)place->half_width_mm;
         const double u = (across - centre) / half_width;
-        if (fabs(u) > 1.3)
+        if (fabs(u) > system->reach)
             continue;
         const double h = (double)place->axis_mm + lens_section(u, half_width, (double)place->sagitta_mm);
         if (h > best.height)
@@ -167,6 +168,14 @@ static on_yarn highest_yarn(const yarn_system *system, int along, double across)
 static uint8_t to_byte(double x)
 {
     return (uint8_t)lround(fmin(fmax(x, 0), 1) * 255);
+}
+
+/* Between the yarns of an open cloth: the ground. */
+static void open_texel(const weft_weave *weave, weft_fabric_texel *texel)
+{
+    texel->height = fmaxf(texel->height, (float)-WEFT_CLOTH_GROUND_MM);
+    texel->dye = (uint8_t)weft_weave_n_dyes(weave);
+    texel->strength = to_byte(0.5);
 }
 
 /* Woven surface at a texel: the higher of warp and weft, with the ribs of its twist. */
@@ -207,6 +216,8 @@ static void weave_texel(const loom *l, int column, int row, weft_fabric_texel *t
     const double angle =
         (is_warp ? 0.25 * TWO_PI : 0) + (is_warp ? 1 : -1) * 0.4 * twist * (is_warp ? 1 : -1);
     texel->fibre = (uint8_t)((int)lround(angle / (0.5 * TWO_PI) * 256) & 255);
+    if (weave->cover > 0 && fabs(top->across) >= 1)
+        open_texel(weave, texel);
 }
 
 /* Corduroy: ribs of cut pile along y, rounded tops, steep flanks down to the ground weave. */
@@ -369,6 +380,14 @@ static void lay_down(weft_fabric *cloth, uint64_t seed)
     }
 }
 
+int weft_weave_n_dyes(const weft_weave *weave)
+{
+    int n = 0;
+    while (n < WEFT_CLOTH_MAX_DYES && weave->dyes[n])
+        n++;
+    return n;
+}
+
 static yarn_system make_system(const weft_weave *weave, bool is_warp)
 {
     const double pitch = is_warp ? weave->warp_pitch_mm : weave->weft_pitch_mm;
@@ -379,6 +398,8 @@ static yarn_system make_system(const weft_weave *weave, bool is_warp)
         .other_pitch_mm = is_warp ? weave->weft_pitch_mm : weave->warp_pitch_mm,
         .bulge_mm = is_warp ? weave->warp_bulge_mm : weave->weft_bulge_mm,
         .crimp_mm = is_warp ? weave->warp_crimp_mm : weave->weft_crimp_mm,
+        .cover = weave->cover > 0 ? weave->cover : 1,
+        .reach = weave->cover > 0 ? 3 : 1.3,
         .sett = is_warp ? weave->warp_sett : weave->weft_sett,
     };
     assert(system.n <= MAX_YARNS && fabs(system.n * pitch - WEFT_CLOTH_PERIOD_MM) < 1e-9);

@@ -19,6 +19,8 @@
 /** Side of a tile: whole numbers of all yarn pitches used. */
 #define WEFT_CLOTH_PERIOD_MM 38.4
 #define WEFT_CLOTH_MAX_DYES  8
+/** How deep the ground lies under the yarns' middle where one sees through the holes, mm. */
+#define WEFT_CLOTH_GROUND_MM 0.45
 #define WEFT_CLOTH_MAX_SETT  48
 
 /** One texel: 16 bytes, so that a sample loads four of them and no more. */
@@ -45,6 +47,7 @@ typedef struct weft_weave {
     int n_draft;          /* the draft repeats after n x n crossings */
     const char *draft[8]; /* row by row along the warp: 'X' warp over weft */
     double warp_pitch_mm, weft_pitch_mm;
+    double cover; /* width of the yarns over their pitch; 0: they touch; else there are holes between them */
     double warp_bulge_mm, weft_bulge_mm;   /* sagitta of the yarn's lenticular section */
     double warp_crimp_mm, weft_crimp_mm;   /* how far the yarn's axis swings from the middle */
     double ply_mm, ply_relief_mm;          /* spacing and amplitude of the ribs of a twisted yarn */
@@ -69,6 +72,9 @@ typedef struct weft_fabric {
     float wave[3][2][2];                   /* distortion: [term][component][0 amplitude mm, 1 phase] */
     float wave_k[3][2];                    /* wave vectors, rad/mm */
 } weft_fabric;
+
+/** Number of dyes; the "dye" of that number is the ground seen through the holes. */
+int weft_weave_n_dyes(const weft_weave *weave);
 
 /** Weaves the tile.  Takes about half a second on two cores. */
 weft_err weft_fabric_init(weft_fabric *cloth, const weft_weave *weave, uint64_t seed, weft_error *err);

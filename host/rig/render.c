@@ -147,6 +147,41 @@ INLINE void cast_ball_shadows(const weft_rig_sample *sample, const weft_rig_hit 
     }
 }
 
+/* What damage hides: a tear's edges its ground, a fibre the cloth under it.  The crease is gentler than any
+   lamp's elevation and hides nothing; it only tilts the cloth. */
+INLINE void cast_damage_shadows(const weft_rig_damage *damage, const weft_rig_hit *hit, const lane_rays *rays,
+                                float visible[LANES])
+{
+    const bool ground = hit->flaw & WEFT_FLAW_TEAR;
+    const float up = (ground ? 0 : damage->crown_mm) - hit->z;
+    for (int i = 0; i < WEFT_RIG_N_LIGHTS; i++) {
+        float normal[3];
+        if (!(visible[i] > 0))
+            continue;
+        const float x = hit->x + up * rays->x[i] / rays->z[i], y = hit->y + up * rays->y[i] / rays->z[i];
+        if (ground ? !weft_rig_damage_torn(damage, x, y)
+                   : weft_rig_damage_fibre(damage, x, y, normal) != NULL)
+            visible[i] = 0;
+    }
+}
+
+INLINE void cast_cloth_shadows(const weft_rig_sample *sample, const weft_fabric_patch *patch,
+                               const weft_rig_hit *hit, const lane_rays *rays, float visible[LANES])
+{
+    if (!sample->damage.present) {
+        weft_fabric_see(&sample->cloth, patch, &hit->cloth, rays->x, rays->y, rays->z, visible);
+        return;
+    }
+    if (hit->flaw & WEFT_FLAW_LINT)
+        return;
+    float z[LANES];
+    for (int i = 0; i < LANES; i++)
+        z[i] = rays->z[i] - (hit->lean[0] * rays->x[i] + hit->lean[1] * rays->y[i]);
+    if (!(hit->flaw & WEFT_FLAW_TEAR))
+        weft_fabric_see(&sample->cloth, patch, &hit->cloth, rays->x, rays->y, z, visible);
+    cast_damage_shadows(&sample->damage, hit, rays, visible);
+}
+
 /* 1 where the lamp sees the point, 0 where something is between. */
 INLINE void cast_shadows(const render_job *job, const weft_fabric_patch *patch, const weft_rig_hit *hit,
                          const lane_rays *rays, float visible[LANES])
@@ -157,7 +192,7 @@ INLINE void cast_shadows(const render_job *job, const weft_fabric_patch *patch, 
     if (job->sample->n_balls) {
         cast_ball_shadows(job->sample, hit, rays, visible);
     } else if (job->sample->has_cloth && hit->material != job->strip) {
-        weft_fabric_see(&job->sample->cloth, patch, &hit->cloth, rays->x, rays->y, rays->z, visible);
+        cast_cloth_shadows(job->sample, patch, hit, rays, visible);
     } else if (job->plate_is_raised && hit->material == 0) {
         const weft_rig_plate *const plate = &job->sample->plate;
         for (int i = 0; i < WEFT_RIG_N_LIGHTS; i++) {
@@ -200,12 +235,21 @@ INLINE void add_mirror(const weft_fabric_gloss *gloss, const weft_rig_hit *hit, 
     }
 }
 
+/* Of a cloth all but what lies on it and under it; of balls only they. */
+INLINE bool has_mirror(const render_job *job, int material)
+{
+    const weft_rig_sample *const sample = job->sample;
+    if (sample->n_balls)
+        return material == 1;
+    return material != job->strip && !(sample->ground && material >= sample->ground);
+}
+
 INLINE void shade(const render_job *job, const weft_fabric_patch *patch, const weft_rig_hit *hit,
                   const float eye[3], const lane_rays *rays, int colour, float sum[LANES], float *room)
 {
     float visible[LANES], mirror[LANES] = {0};
     cast_shadows(job, patch, hit, rays, visible);
-    if (job->gloss.f0 > 0 && hit->material != job->strip && (!job->sample->n_balls || hit->material == 1))
+    if (job->gloss.f0 > 0 && has_mirror(job, hit->material))
         add_mirror(&job->gloss, hit, eye, rays, mirror);
     const float *const diffuse = job->colours->diffuse[hit->material][colour];
     const float *const bounce = job->colours->bounce[hit->material][colour];
@@ -353,7 +397,7 @@ typedef struct truth_job {
     const weft_rig_sample *sample;
     weft_rig_tracer tracer;
     float srgb[WEFT_RIG_MAX_MATERIALS][3];
-    weft_image *normal, *albedo;
+    weft_rig_truth *to;
 } truth_job;
 
 static void truth_pixel(const truth_job *job, int u, int v)
@@ -363,7 +407,8 @@ static void truth_pixel(const truth_job *job, int u, int v)
     weft_fabric_patch patch = {0};
     if (job->sample->has_cloth)
         patch = weft_fabric_patch_at(&job->sample->cloth, at.x, at.y);
-    float normal[3] = {0}, albedo[3] = {0};
+    float normal[3] = {0}, albedo[3] = {0}, cloth = 0;
+    unsigned flaws = 0;
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             const float du = ((float)i + 0.5F) / (float)n - 0.5F, dv = ((float)j + 0.5F) / (float)n - 0.5F;
@@ -375,12 +420,18 @@ static void truth_pixel(const truth_job *job, int u, int v)
             normal[2] += hit.nz;
             for (int c = 0; c < 3; c++)
                 albedo[c] += hit.strength * job->srgb[hit.material][c];
+            flaws |= hit.flaw;
+            cloth += job->sample->ground && hit.material == job->sample->ground ? 0 : 1;
         }
     const float scale = 1 / sqrtf(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
     for (int c = 0; c < 3; c++) {
-        weft_image_row(job->normal, c, v)[u] = scale * normal[c];
-        weft_image_row(job->albedo, c, v)[u] = albedo[c] / (float)(n * n);
+        weft_image_row(&job->to->normal, c, v)[u] = scale * normal[c];
+        weft_image_row(&job->to->albedo, c, v)[u] = albedo[c] / (float)(n * n);
     }
+    if (job->to->alpha.planes)
+        weft_image_row(&job->to->alpha, 0, v)[u] = cloth / (float)(n * n);
+    if (job->to->flaws.data)
+        job->to->flaws.data[(size_t)v * (size_t)job->to->flaws.width + (size_t)u] = (uint8_t)flaws;
 }
 
 static void truth_rows(void *context, int band, int begin, int end)
@@ -392,26 +443,42 @@ static void truth_rows(void *context, int band, int begin, int end)
             truth_pixel(job, u, v);
 }
 
+static weft_err make_truth(weft_rig_truth *to, const weft_rig_sample *sample, int width, int height,
+                           weft_error *err)
+{
+    WEFT_TRY(weft_image_init(&to->normal, width, height, 3, err));
+    WEFT_TRY(weft_image_init(&to->albedo, width, height, 3, err));
+    if (sample->ground)
+        WEFT_TRY(weft_image_init(&to->alpha, width, height, 1, err));
+    return sample->damage.present ? weft_mask_init(&to->flaws, width, height, 0, err) : WEFT_OK;
+}
+
+void weft_rig_truth_fini(weft_rig_truth *truth)
+{
+    weft_image_fini(&truth->normal);
+    weft_image_fini(&truth->albedo);
+    weft_image_fini(&truth->alpha);
+    weft_mask_fini(&truth->flaws);
+}
+
 weft_err weft_rig_truth_maps(const weft_rig_scene *scene, const weft_rig_view *view,
-                             const weft_rig_sample *sample, weft_image *normal, weft_image *albedo,
-                             weft_error *err)
+                             const weft_rig_sample *sample, weft_rig_truth *truth, weft_error *err)
 {
     truth_job job = {.scene = scene,
                      .view = view,
                      .sample = sample,
                      .tracer = weft_rig_tracer_make(sample, view->centre),
-                     .normal = normal,
-                     .albedo = albedo};
+                     .to = truth};
     for (int m = 0; m < sample->n_materials; m++) {
         double rgb[3];
         weft_spectra_srgb(&scene->spectra, &sample->materials[m], rgb);
         for (int c = 0; c < 3; c++)
             job.srgb[m][c] = (float)rgb[c];
     }
-    WEFT_TRY(weft_image_init(normal, view->ground.width, view->ground.height, 3, err));
-    const weft_err status = weft_image_init(albedo, view->ground.width, view->ground.height, 3, err);
+    *truth = (weft_rig_truth){0};
+    const weft_err status = make_truth(truth, sample, view->ground.width, view->ground.height, err);
     if (status != WEFT_OK) {
-        weft_image_fini(normal);
+        weft_rig_truth_fini(truth);
         return status;
     }
     weft_parallel_rows(view->ground.height, truth_rows, &job);

@@ -26,7 +26,7 @@ typedef struct weft_rig_view {
 weft_err weft_rig_view_sensor(weft_rig_view *view, const weft_rig_scene *scene, weft_error *err);
 
 /** A regular grid on z = 0, pixel centres symmetric about the origin, row 0 at the top (+y): as many whole
- *  pixels as the sensor's field holds. */
+ *  pixels as the sensor's field holds, an even number each way as in the solver's grids. */
 weft_err weft_rig_view_plane(weft_rig_view *view, const weft_rig_scene *scene, double mm_per_px,
                              weft_error *err);
 void weft_rig_view_fini(weft_rig_view *view);
@@ -42,14 +42,16 @@ weft_err weft_rig_frames_init(weft_rig_frames *frames, const weft_rig_scene *sce
                               const weft_rig_sample *sample, weft_error *err);
 void weft_rig_frames_fini(weft_rig_frames *frames);
 
-/**
- * The maps that a perfect scan would give, per pixel of a view.
- *
- * @param normal  [3]: normalised mean of the unit normals over the pixel's footprint
- * @param albedo  [3]: mean diffuse reflectance over the footprint, linear sRGB D65 (not clipped)
- */
+/** The maps that a perfect scan would give, per pixel of a view. */
+typedef struct weft_rig_truth {
+    weft_image normal; /* [3]: normalised mean of the unit normals over the pixel's footprint */
+    weft_image albedo; /* [3]: mean diffuse reflectance over the footprint, linear sRGB D65 (not clipped) */
+    weft_image alpha;  /* [1]: share of the footprint that is not the ground; planes 0 of a closed cloth */
+    weft_mask flaws;   /* weft_flaw bits of any ray; data NULL of a cloth without */
+} weft_rig_truth;
+
 weft_err weft_rig_truth_maps(const weft_rig_scene *scene, const weft_rig_view *view,
-                             const weft_rig_sample *sample, weft_image *normal, weft_image *albedo,
-                             weft_error *err);
+                             const weft_rig_sample *sample, weft_rig_truth *truth, weft_error *err);
+void weft_rig_truth_fini(weft_rig_truth *truth);
 
 #endif

@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define RAD_PER_DEG 0.017453292519943295
+#define RAD_PER_DEG     0.017453292519943295
+#define WEFT_RIG_GROUND 0.02 /* reflectance of black velvet */
 
 /* ------------------------------------------------------------------------------------------ names */
 
@@ -234,17 +235,43 @@ static weft_err init_chart(weft_rig_sample *sample, const weft_rig_scene *scene,
     return WEFT_OK;
 }
 
+/* A crease, tears, and lint that is dark on a light cloth and light on a dark one. */
+static void spoil(weft_rig_sample *sample, const weft_rig_scene *scene)
+{
+    double luminance = 0, area = 0;
+    for (int m = 0; m < sample->ground; m++) {
+        double rgb[3];
+        weft_spectra_srgb(&scene->spectra, &sample->materials[m], rgb);
+        luminance += sample->share[m] * (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]);
+        area += sample->share[m];
+    }
+    weft_rig_damage *const damage = &sample->damage;
+    weft_rig_damage_init(damage, scene->setup.seed);
+    damage->present = true;
+    damage->ground = sample->ground;
+    damage->lint = sample->n_materials++;
+    damage->floor_mm = sample->cloth.lowest_mm - 0.3F;
+    damage->crown_mm = sample->cloth.highest_mm;
+    sample->materials[damage->lint] = weft_spectrum_flat(luminance > 0.25 * area ? 0.05 : 0.7);
+}
+
 static weft_err init_cloth(weft_rig_sample *sample, const weft_rig_scene *scene, const weft_weave *weave,
-                           weft_error *err)
+                           bool flawed, weft_error *err)
 {
     for (int i = 0; i < WEFT_CLOTH_MAX_DYES && weave->dyes[i]; i++) {
         const weft_spectrum *dye;
         WEFT_TRY(weft_spectra_find_dye(&scene->spectra, weave->dyes[i], &dye, err));
         sample->materials[sample->n_materials++] = *dye;
     }
+    if (weave->cover > 0 || flawed) {
+        sample->ground = sample->n_materials++;
+        sample->materials[sample->ground] = weft_spectrum_flat(WEFT_RIG_GROUND);
+    }
     WEFT_TRY(weft_fabric_init(&sample->cloth, weave, scene->setup.seed, err));
     sample->has_cloth = true;
     memcpy(sample->share, sample->cloth.dye_share, sizeof sample->cloth.dye_share);
+    if (flawed)
+        spoil(sample, scene);
     return WEFT_OK;
 }
 
@@ -307,9 +334,11 @@ static weft_err init_by_name(weft_rig_sample *sample, const weft_rig_scene *scen
             return WEFT_OK;
         }
     }
-    for (const weft_weave *w = weft_weaves; w->name; w++)
-        if (strcmp(name, w->name) == 0)
-            return init_cloth(sample, scene, w, err);
+    for (const weft_weave *w = weft_weaves; w->name; w++) {
+        const size_t n = strlen(w->name);
+        if (strncmp(name, w->name, n) == 0 && (!name[n] || strcmp(name + n, "+flaws") == 0))
+            return init_cloth(sample, scene, w, name[n] != '\0', err);
+    }
     return fail_unknown(name, err);
 }
 

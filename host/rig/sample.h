@@ -5,6 +5,7 @@
 #define WEFT_HOST_RIG_SAMPLE_H
 
 #include "calibration/charts/chart.h"
+#include "host/rig/damage.h"
 #include "host/rig/fabric.h"
 #include "host/rig/scene.h"
 
@@ -49,9 +50,11 @@ typedef struct weft_rig_sample {
     weft_spectrum materials[WEFT_RIG_MAX_MATERIALS]; /* reflectance of a matte surface */
     double share[WEFT_RIG_MAX_MATERIALS];            /* of the surface; fabrics only (light between yarns) */
     bool has_plate, has_cloth;
-    bool has_sheet;     /* "white" with setup.sheet: material 0 is the sheet, 1 the table */
-    int strip_material; /* of the white strip; 0: there is none */
-    double strip_mm[4]; /* left, bottom, right, top */
+    bool has_sheet;         /* "white" with setup.sheet: material 0 is the sheet, 1 the table */
+    int strip_material;     /* of the white strip; 0: there is none */
+    double strip_mm[4];     /* left, bottom, right, top */
+    int ground;             /* material under an open or torn cloth; 0: nowhere seen */
+    weft_rig_damage damage; /* of "FABRIC+flaws" */
     weft_rig_sheet sheet;
     int n_balls; /* material 0 is the table, 1 the balls */
     weft_rig_ball balls[WEFT_RIG_N_BALLS];
@@ -62,7 +65,8 @@ typedef struct weft_rig_sample {
 /** Name and one line about sample `i`; false behind the last.  `name` has room for 32, `summary` for 128. */
 bool weft_rig_sample_describe(int i, char *name, char *summary);
 
-/** Makes the sample of a name.  @return WEFT_ERR_USAGE with the nearest name, WEFT_ERR_NOMEM */
+/** Makes the sample of a name; a fabric's name with "+flaws" behind it is that fabric creased, torn and with
+ *  lint on it.  @return WEFT_ERR_USAGE with the nearest name, WEFT_ERR_NOMEM */
 weft_err weft_rig_sample_init(weft_rig_sample *sample, const weft_rig_scene *scene, const char *name,
                               weft_error *err);
 void weft_rig_sample_fini(weft_rig_sample *sample);

@@ -61,14 +61,52 @@ static void trace_plate(const weft_rig_tracer *tracer, float gx, float gy, weft_
     hit->material = material;
 }
 
+/* What is seen in place of the cloth: a fibre on it, the ground where it is torn. */
+static void hit_damage(const weft_rig_damage *damage, float gx, float gy, float dx, float dy, float bent,
+                       weft_rig_hit *hit)
+{
+    float normal[3];
+    const float top = damage->crown_mm + bent;
+    hit->flaw = weft_rig_damage_on_crease(damage, hit->x, hit->y) ? WEFT_FLAW_CREASE : 0;
+    const weft_rig_fibre *const fibre = weft_rig_damage_fibre(damage, gx + top * dx, gy + top * dy, normal);
+    if (fibre) {
+        hit->flaw |= WEFT_FLAW_LINT;
+        hit->z = top + fibre->radius * normal[2];
+        hit->material = damage->lint;
+    } else if (weft_rig_damage_torn(damage, gx, gy)) {
+        hit->flaw |= WEFT_FLAW_TEAR;
+        hit->z = damage->floor_mm;
+        hit->material = damage->ground;
+        normal[0] = normal[1] = 0;
+        normal[2] = 1;
+    } else {
+        return;
+    }
+    hit->x = gx + hit->z * dx;
+    hit->y = gy + hit->z * dy;
+    hit->nx = normal[0];
+    hit->ny = normal[1];
+    hit->nz = normal[2];
+    hit->strength = 1;
+    hit->openness = hit->flaw & WEFT_FLAW_LINT ? 1 : 0.3F;
+}
+
 static void trace_cloth(const weft_rig_tracer *tracer, const weft_fabric_patch *patch, float gx, float gy,
                         weft_rig_hit *hit)
 {
     const float *const c = tracer->centre;
     const float dx = (c[0] - gx) / c[2], dy = (c[1] - gy) / c[2];
     weft_fabric_point *const point = &hit->cloth;
-    weft_fabric_meet(&tracer->sample->cloth, patch, gx, gy, dx, dy, point);
-    const float z = point->height;
+    const weft_rig_damage *const damage = &tracer->sample->damage;
+    float bent = 0;
+    hit->flaw = 0;
+    hit->lean[0] = hit->lean[1] = 0;
+    if (damage->present)
+        weft_rig_damage_bend(damage, gx, gy, &bent, hit->lean);
+    weft_fabric_meet(&tracer->sample->cloth, patch, gx + bent * dx, gy + bent * dy, dx, dy, point);
+    point->slope_x += hit->lean[0];
+    point->slope_y += hit->lean[1];
+    const float z = point->height + bent;
     const float scale = 1 / sqrtf(1 + point->slope_x * point->slope_x + point->slope_y * point->slope_y);
     hit->x = gx + z * dx;
     hit->y = gy + z * dy;
@@ -85,6 +123,8 @@ static void trace_cloth(const weft_rig_tracer *tracer, const weft_fabric_patch *
     hit->strength = point->strength;
     hit->openness = point->openness;
     hit->material = point->dye;
+    if (damage->present)
+        hit_damage(damage, gx, gy, dx, dy, bent, hit);
 }
 
 /* A sheet that is bent or tilted: the ray is followed up to the height it meets. */
@@ -216,7 +256,7 @@ weft_err weft_rig_view_plane(weft_rig_view *view, const weft_rig_scene *scene, d
         if (!weft_camera_to_plane(camera, at[i][0], at[i][1], 0, &middle[i]))
             return weft_fail(err, WEFT_ERR_RANGE, "the camera does not see the table");
     const double half_width = fmin(-middle[0].x, middle[1].x), half_height = fmin(middle[2].y, -middle[3].y);
-    const double columns = floor(2 * half_width / mm_per_px), rows = floor(2 * half_height / mm_per_px);
+    const double columns = 2 * floor(half_width / mm_per_px), rows = 2 * floor(half_height / mm_per_px);
     if (!(columns >= 1 && rows >= 1 && columns <= WEFT_IMAGE_MAX_SIDE && rows <= WEFT_IMAGE_MAX_SIDE))
         return weft_fail(err, WEFT_ERR_RANGE,
                          "a grid of %g mm per pixel does not fit the field of %.0f x %.0f mm", mm_per_px,

@@ -23,6 +23,8 @@ typedef struct weft_rig_hit {
     float tx, ty, tz;         /* unit tangent along the fibres (fabric only) */
     float strength, openness; /* reflectance factor; share of the sky seen */
     int material;
+    unsigned flaw;           /* weft_flaw bits */
+    float lean[2];           /* slopes of the bent cloth under the weave */
     weft_fabric_point cloth; /* fabric only */
 } weft_rig_hit;
 

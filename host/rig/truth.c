@@ -54,6 +54,7 @@ static weft_err write_maps(const weft_rig_stage *stage, const weft_rig_view *vie
 {
     const weft_rig_scene *const scene = weft_rig_stage_scene(stage);
     const weft_rig_sample *const sample = weft_rig_stage_sample(stage);
+    weft_rig_truth truth = {0};
     weft_maps maps = {
         .width = view->ground.width,
         .height = view->ground.height,
@@ -70,7 +71,11 @@ static weft_err write_maps(const weft_rig_stage *stage, const weft_rig_view *vie
                           scene->setup.supersample, "rays", "from the camera");
     weft_err status = maps.info ? WEFT_OK : weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
     if (status == WEFT_OK)
-        status = weft_rig_truth_maps(scene, view, sample, &maps.normal, &maps.albedo, err);
+        status = weft_rig_truth_maps(scene, view, sample, &truth, err);
+    maps.normal = truth.normal;
+    maps.albedo = truth.albedo;
+    maps.alpha = truth.alpha;
+    maps.flaws = truth.flaws;
     if (status == WEFT_OK)
         status = weft_maps_save(path, &maps, false, err);
     weft_maps_fini(&maps);

@@ -14,11 +14,25 @@ typedef struct weft_spread {
 /** Sorts `values` (no NaN) and takes its figures; percentiles are the nearest rank. */
 weft_spread weft_spread_of(float *values, size_t n);
 
+/** Flags of A against those of B, which are taken for the truth. */
+typedef struct weft_flaw_match {
+    size_t a, b;  /* pixels flagged */
+    size_t hits;  /* of A's those that have one of B's within reach */
+    size_t found; /* of B's those that have one of A's */
+} weft_flaw_match;
+
+/** Flags of tears and lint may be half a millimetre off, those of creases two: a line has no width to agree
+ * on. */
+extern const double weft_flaw_reach_mm[WEFT_N_FLAWS];
+
 typedef struct weft_maps_difference {
-    bool has_normal, has_albedo;
-    weft_spread normal_deg;    /* angle between the normals */
-    weft_spread delta_e;       /* CIEDE2000 between the albedos as linear sRGB under D65 */
-    weft_spread luminance;     /* relative difference of the albedo's luminance, |a / b - 1| */
+    bool has_normal, has_albedo, has_alpha, has_flaws;
+    weft_spread normal_deg;              /* angle between the normals */
+    weft_spread delta_e;                 /* CIEDE2000 between the albedos as linear sRGB under D65 */
+    weft_spread luminance;               /* relative difference of the albedo's luminance, |a / b - 1| */
+    weft_spread alpha;                   /* |a - b| where either is below 1 */
+    double cover[2];                     /* mean alpha of A and of B */
+    weft_flaw_match flaws[WEFT_N_FLAWS]; /* in the order of the bits; plane maps only */
     size_t only_a, only_b;     /* pixels with an answer in one alone (where both cover the sample) */
     int offset_px[2];          /* of A's pixel (0, 0) in B */
     double mean_normal_deg[2]; /* mean of A's normals against B's: turn about y and about x, degrees */

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 static const double degrees = 57.29577951308232;
+const double weft_flaw_reach_mm[WEFT_N_FLAWS] = {0.5, 2, 0.5};
 
 static int ascending(const void *a, const void *b)
 {
@@ -164,11 +165,65 @@ static void compare_albedos(const overlap *o, float *values, float *ratios, weft
     d->albedo_is_camera_rgb = !o->a->albedo_is_srgb || !o->b->albedo_is_srgb;
 }
 
+static void compare_alphas(const overlap *o, float *values, weft_maps_difference *d)
+{
+    size_t n = 0, both = 0, at_a, at_b;
+    for (int y = o->begin[1]; y < o->end[1]; y++)
+        for (int x = o->begin[0]; x < o->end[0]; x++) {
+            if (who(o, x, y, &at_a, &at_b) != 3)
+                continue;
+            const float a = o->a->alpha.data[at_a], b = o->b->alpha.data[at_b];
+            both++;
+            d->cover[0] += (double)a;
+            d->cover[1] += (double)b;
+            if (a < 1 || b < 1)
+                values[n++] = fabsf(a - b);
+        }
+    d->alpha = weft_spread_of(values, n);
+    for (int k = 0; k < 2 && both; k++)
+        d->cover[k] /= (double)both;
+}
+
+/* Whether `flaw` is flagged within `reach` pixels of (x, y). */
+static bool flagged_near(const weft_mask *flags, int x, int y, int reach, unsigned flaw)
+{
+    for (int j = y - reach < 0 ? 0 : y - reach; j <= y + reach && j < flags->height; j++)
+        for (int i = x - reach < 0 ? 0 : x - reach; i <= x + reach && i < flags->width; i++)
+            if (flags->data[(size_t)j * (size_t)flags->width + (size_t)i] & flaw)
+                return true;
+    return false;
+}
+
+static weft_flaw_match match_flaw(const overlap *o, int k)
+{
+    const weft_mask *const a = &o->a->flaws, *const b = &o->b->flaws;
+    const unsigned flaw = 1U << k;
+    const int reach = (int)fmax(1, round(weft_flaw_reach_mm[k] / o->a->mm_per_px));
+    weft_flaw_match m = {0};
+    size_t at_a, at_b;
+    for (int y = o->begin[1]; y < o->end[1]; y++)
+        for (int x = o->begin[0]; x < o->end[0]; x++) {
+            if (who(o, x, y, &at_a, &at_b) != 3)
+                continue;
+            if (a->data[at_a] & flaw) {
+                m.a++;
+                m.hits += flagged_near(b, x + o->offset[0], y + o->offset[1], reach, flaw);
+            }
+            if (b->data[at_b] & flaw) {
+                m.b++;
+                m.found += flagged_near(a, x, y, reach, flaw);
+            }
+        }
+    return m;
+}
+
 weft_err weft_compare_maps(const weft_maps *a, const weft_maps *b, const weft_mask *mask,
                            weft_maps_difference *difference, weft_error *err)
 {
     weft_maps_difference d = {.has_normal = a->normal.planes == 3 && b->normal.planes == 3,
                               .has_albedo = a->albedo.planes == 3 && b->albedo.planes == 3};
+    d.has_alpha = a->alpha.planes && b->alpha.planes;
+    d.has_flaws = a->flaws.data && b->flaws.data && a->geometry == WEFT_GEOMETRY_PLANE;
     overlap o = {.a = a, .b = b, .mask = mask};
     if (!d.has_normal && !d.has_albedo)
         return weft_fail(err, WEFT_ERR_NODATA, "the maps have neither normals nor albedo in common");
@@ -186,6 +241,10 @@ weft_err weft_compare_maps(const weft_maps *a, const weft_maps *b, const weft_ma
         compare_normals(&o, values, &d);
     if (d.has_albedo)
         compare_albedos(&o, values, values + room, &d);
+    if (d.has_alpha)
+        compare_alphas(&o, values, &d);
+    for (int k = 0; k < WEFT_N_FLAWS && d.has_flaws; k++)
+        d.flaws[k] = match_flaw(&o, k);
     weft_free(values);
     if (d.normal_deg.n == 0 && d.delta_e.n == 0)
         return weft_fail(err, WEFT_ERR_NODATA, "there is no pixel where both maps have an answer");

@@ -27,6 +27,8 @@ void weft_maps_fini(weft_maps *maps)
     weft_image_fini(&maps->confidence);
     weft_image_fini(&maps->uncertainty);
     weft_image_fini(&maps->height_mm);
+    weft_image_fini(&maps->alpha);
+    weft_mask_fini(&maps->flaws);
     weft_mask_fini(&maps->lights);
     weft_mask_fini(&maps->quality);
     weft_mask_fini(&maps->mask);
@@ -67,6 +69,8 @@ static weft_err check_maps(const char *folder, const weft_maps *maps, weft_error
     WEFT_TRY(check_image(folder, "residual", &maps->residual, 1, maps, err));
     WEFT_TRY(check_image(folder, "confidence", &maps->confidence, 1, maps, err));
     WEFT_TRY(check_image(folder, "uncertainty", &maps->uncertainty, 1, maps, err));
+    WEFT_TRY(check_image(folder, "alpha", &maps->alpha, 1, maps, err));
+    WEFT_TRY(check_mask(folder, "map of flaws", &maps->flaws, maps, err));
     WEFT_TRY(check_mask(folder, "map of lights used", &maps->lights, maps, err));
     WEFT_TRY(check_mask(folder, "quality map", &maps->quality, maps, err));
     WEFT_TRY(check_mask(folder, "mask", &maps->mask, maps, err));
@@ -154,6 +158,16 @@ static weft_err write_uncertainty_exr(const char *path, const weft_maps *maps, w
     return weft_exr_write(path, &maps->uncertainty, grey_names, WEFT_EXR_HALF, err);
 }
 
+static weft_err write_alpha_exr(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_exr_write(path, &maps->alpha, grey_names, WEFT_EXR_HALF, err);
+}
+
+static weft_err write_flaws_png(const char *path, const weft_maps *maps, weft_error *err)
+{
+    return weft_png_write_bytes(path, &maps->flaws, err);
+}
+
 static weft_err write_lights_png(const char *path, const weft_maps *maps, weft_error *err)
 {
     return weft_png_write_bytes(path, &maps->lights, err);
@@ -194,6 +208,8 @@ static weft_err write_all(const char *folder, const weft_maps *maps, weft_error 
         {maps->confidence.planes != 0, "confidence.exr", write_confidence_exr},
         {maps->uncertainty.planes != 0, "uncertainty.exr", write_uncertainty_exr},
         {maps->height_mm.planes != 0, "height.exr", write_height_exr},
+        {maps->alpha.planes != 0, "alpha.exr", write_alpha_exr},
+        {maps->flaws.data != NULL, "flaws.png", write_flaws_png},
         {maps->lights.data != NULL, "lights.png", write_lights_png},
         {maps->quality.data != NULL, "quality.png", write_quality_png},
         {maps->mask.data != NULL, "mask.png", write_mask_png},
@@ -349,6 +365,8 @@ static weft_err load_into(const char *folder, weft_maps *maps, weft_error *err)
     WEFT_TRY(read_map(folder, "residual.exr", grey_names, 1, maps, &maps->residual, err));
     WEFT_TRY(read_map(folder, "confidence.exr", grey_names, 1, maps, &maps->confidence, err));
     WEFT_TRY(read_map(folder, "uncertainty.exr", grey_names, 1, maps, &maps->uncertainty, err));
+    WEFT_TRY(read_map(folder, "alpha.exr", grey_names, 1, maps, &maps->alpha, err));
+    WEFT_TRY(read_mask(folder, "flaws.png", weft_png_read_bytes, maps, &maps->flaws, err));
     WEFT_TRY(read_mask(folder, "lights.png", weft_png_read_bytes, maps, &maps->lights, err));
     WEFT_TRY(read_mask(folder, "quality.png", weft_png_read_bytes, maps, &maps->quality, err));
     WEFT_TRY(read_mask(folder, "mask.png", weft_png_read_mask, maps, &maps->mask, err));

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/image.h"
+#include "host/set/flaw_bits.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -24,6 +25,8 @@ typedef struct weft_maps {
     weft_image uncertainty; /* 1 plane: expected error of the normal, rms, degrees; planes 0 when absent */
     weft_image
         height_mm; /* 1 plane: height of the surface, mean 0, mm; planes 0 when absent; written, not read */
+    weft_image alpha;    /* 1 plane 0..1: share of the pixel that the sample covers; planes 0 when absent */
+    weft_mask flaws;     /* weft_flaw bits; data NULL when absent */
     weft_mask lights;    /* lights that each answer rests on; data NULL when absent */
     weft_mask quality;   /* bits of docs/formats.md; data NULL when absent */
     weft_mask mask;      /* 255 where there is an answer; data NULL: everywhere */

@@ -1,12 +1,13 @@
 #include "host/solve/finish.h"
 
 #include "core/mem.h"
+#include "host/solve/running_mean.h"
 #include "shading/bake/height.h"
 #include "shading/bake/height_poisson.h"
 
 #include <math.h>
 
-static weft_err require_plane(const weft_maps *maps, const char *what, weft_error *err)
+weft_err weft_maps_require_plane(const weft_maps *maps, const char *what, weft_error *err)
 {
     return maps->geometry == WEFT_GEOMETRY_PLANE
                ? WEFT_OK
@@ -20,39 +21,6 @@ static weft_err require_plane(const weft_maps *maps, const char *what, weft_erro
 /* ---- flattening ---- */
 
 enum { ROUNDS = 3 };
-
-/* Sums over 2 reach + 1 neighbours along a row of `n`; beyond the ends there is nothing. */
-static void sum_row(const float *from, int n, int reach, float *to)
-{
-    double sum = 0;
-    for (int i = 0; i < reach && i < n; i++)
-        sum += (double)from[i];
-    for (int i = 0; i < n; i++) {
-        if (i + reach < n)
-            sum += (double)from[i + reach];
-        if (i - reach - 1 >= 0)
-            sum -= (double)from[i - reach - 1];
-        to[i] = (float)(sum / (2 * reach + 1));
-    }
-}
-
-/* The same along the columns, all of them at once. */
-static void sum_columns(const weft_image *from, int plane, int reach, double *sums, weft_image *to)
-{
-    const int w = from->width, h = from->height;
-    for (int u = 0; u < w; u++)
-        sums[u] = 0;
-    for (int v = -reach; v < h; v++) {
-        const float *const in = v + reach < h ? weft_image_row(from, plane, v + reach) : NULL;
-        const float *const out = v - reach - 1 >= 0 ? weft_image_row(from, plane, v - reach - 1) : NULL;
-        for (int u = 0; in && u < w; u++)
-            sums[u] += (double)in[u];
-        for (int u = 0; out && u < w; u++)
-            sums[u] -= (double)out[u];
-        for (int u = 0; v >= 0 && u < w; u++)
-            weft_image_row(to, plane, v)[u] = (float)(sums[u] / (2 * reach + 1));
-    }
-}
 
 /* Slopes times weight, and the weight: means of both give the mean slope over what is answered. */
 static void fill_slopes(const weft_maps *maps, weft_image *slopes)
@@ -89,7 +57,7 @@ static void take_off(weft_maps *maps, const weft_image *slow)
 
 weft_err weft_maps_flatten(weft_maps *maps, double wavelength_mm, weft_error *err)
 {
-    WEFT_TRY(require_plane(maps, "--flatten", err));
+    WEFT_TRY(weft_maps_require_plane(maps, "--flatten", err));
     /* a Gaussian of sigma has exp(-2 pi^2 sigma^2 / wavelength^2) left: 1/2 at sigma = 0.1874 wavelength;
      * three means over n pixels have the variance (n^2 - 1) / 4 */
     const double sigma_px = sqrt(log(2) / 2) / 3.141592653589793 * wavelength_mm / maps->mm_per_px;
@@ -97,24 +65,13 @@ weft_err weft_maps_flatten(weft_maps *maps, double wavelength_mm, weft_error *er
     if (reach < 1)
         return weft_fail(err, WEFT_ERR_RANGE, "--flatten %g: less than four pixels of %.4g mm", wavelength_mm,
                          maps->mm_per_px);
-    weft_image a = {0}, b = {0};
-    double *const sums = weft_alloc((size_t)maps->width, sizeof *sums, err);
-    weft_err status = sums ? weft_image_init(&a, maps->width, maps->height, 3, err) : WEFT_ERR_NOMEM;
+    weft_image slopes;
+    WEFT_TRY(weft_image_init(&slopes, maps->width, maps->height, 3, err));
+    fill_slopes(maps, &slopes);
+    const weft_err status = weft_running_mean(&slopes, reach, ROUNDS, err);
     if (status == WEFT_OK)
-        status = weft_image_init(&b, maps->width, maps->height, 3, err);
-    if (status == WEFT_OK) {
-        fill_slopes(maps, &a);
-        for (int round = 0; round < ROUNDS; round++)
-            for (int c = 0; c < 3; c++) {
-                for (int v = 0; v < maps->height; v++)
-                    sum_row(weft_image_row(&a, c, v), maps->width, reach, weft_image_row(&b, c, v));
-                sum_columns(&b, c, reach, sums, &a);
-            }
-        take_off(maps, &a);
-    }
-    weft_image_fini(&a);
-    weft_image_fini(&b);
-    weft_free(sums);
+        take_off(maps, &slopes);
+    weft_image_fini(&slopes);
     return status;
 }
 
@@ -179,7 +136,7 @@ weft_err weft_maps_integrate(weft_maps *maps, weft_height_how how, weft_error *e
     weft_height_info info = {0};
     if (how == WEFT_HEIGHT_NONE)
         return WEFT_OK;
-    WEFT_TRY(require_plane(maps, "--height", err));
+    WEFT_TRY(weft_maps_require_plane(maps, "--height", err));
     const float *const weight = maps->confidence.planes ? maps->confidence.data : NULL;
     WEFT_TRY(how == WEFT_HEIGHT_RELAX
                  ? relax(maps, &height, err)

@@ -4,6 +4,10 @@
 
 #include "host/set/maps.h"
 
+/** @param what  the option that needs them
+ *  @return WEFT_ERR_MISSING for maps that are not of the plane */
+weft_err weft_maps_require_plane(const weft_maps *maps, const char *what, weft_error *err);
+
 /**
  * Takes slow bends off the normals: a high pass of the slopes -n_x/n_z, -n_y/n_z.
  *

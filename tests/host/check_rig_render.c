@@ -236,10 +236,10 @@ static void truth_is_the_mean_over_the_footprint(void **state)
     (void)state;
     static weft_rig_sample sample;
     weft_rig_view plane;
-    weft_image normal, albedo;
+    weft_rig_truth truth;
     make_wave(&sample);
     assert_ok(weft_rig_view_plane(&plane, &scene, 0.5, err));
-    assert_ok(weft_rig_truth_maps(&scene, &plane, &sample, &normal, &albedo, err));
+    assert_ok(weft_rig_truth_maps(&scene, &plane, &sample, &truth, err));
     const int width = plane.ground.width, height = plane.ground.height;
     double worst = 0;
     for (int v = 0; v < height; v += 7)
@@ -250,16 +250,15 @@ static void truth_is_the_mean_over_the_footprint(void **state)
                 const double y = ((height - 1) / 2.0 - v - (k / 3 - 1) / 3.0) * 0.5;
                 sum = weft_add(sum, wave_normal(meet_wave(x, y).x));
             }
-            const weft_vec3 got = {(double)weft_image_row(&normal, 0, v)[u],
-                                   (double)weft_image_row(&normal, 1, v)[u],
-                                   (double)weft_image_row(&normal, 2, v)[u]};
+            const weft_vec3 got = {(double)weft_image_row(&truth.normal, 0, v)[u],
+                                   (double)weft_image_row(&truth.normal, 1, v)[u],
+                                   (double)weft_image_row(&truth.normal, 2, v)[u]};
             worst = fmax(worst, weft_angle_between(got, sum));
-            assert_near((double)weft_image_row(&albedo, 1, v)[u], WAVE_ALBEDO, 1e-4);
+            assert_near((double)weft_image_row(&truth.albedo, 1, v)[u], WAVE_ALBEDO, 1e-4);
         }
     print_message("truth of a wave: worst normal %.4f deg\n", worst * 57.29578);
     assert_true(worst * 57.29578 < 0.02);
-    weft_image_fini(&normal);
-    weft_image_fini(&albedo);
+    weft_rig_truth_fini(&truth);
     weft_rig_view_fini(&plane);
     weft_rig_sample_fini(&sample);
 }
@@ -269,21 +268,20 @@ static void truth_of_a_board(void **state)
 {
     (void)state;
     static weft_rig_sample sample;
-    weft_image normal, albedo;
+    weft_rig_truth truth;
     assert_ok(weft_rig_sample_init(&sample, &scene, "board-9", err));
-    assert_ok(weft_rig_truth_maps(&scene, &view, &sample, &normal, &albedo, err));
+    assert_ok(weft_rig_truth_maps(&scene, &view, &sample, &truth, err));
     double u, v;
     assert_true(weft_camera_project(&scene.camera, weft_rig_plate_point(&sample.plate, 5, 0), &u, &v));
     const int row = (int)lround(v), column = (int)lround(u);
-    const weft_vec3 got = {(double)weft_image_row(&normal, 0, row)[column],
-                           (double)weft_image_row(&normal, 1, row)[column],
-                           (double)weft_image_row(&normal, 2, row)[column]};
+    const weft_vec3 got = {(double)weft_image_row(&truth.normal, 0, row)[column],
+                           (double)weft_image_row(&truth.normal, 1, row)[column],
+                           (double)weft_image_row(&truth.normal, 2, row)[column]};
     assert_near(weft_angle_between(got, sample.plate.normal), 0, 1e-6);
     double rgb[3];
     weft_spectra_srgb(&scene.spectra, &sample.materials[weft_rig_plate_material(&sample.plate, 5, 0)], rgb);
-    assert_near((double)weft_image_row(&albedo, 0, row)[column], rgb[0], 1e-6);
-    weft_image_fini(&normal);
-    weft_image_fini(&albedo);
+    assert_near((double)weft_image_row(&truth.albedo, 0, row)[column], rgb[0], 1e-6);
+    weft_rig_truth_fini(&truth);
     weft_rig_sample_fini(&sample);
 }
 

@@ -4,11 +4,13 @@
 #   WEFT_FABRIC_SEEDS="1 2 ... 10"  one scanner each: lamps, lens, cloth and noise   (default 1)
 #   WEFT_FABRIC_SAMPLES="satin ..." (default satin corduroy)
 #   WEFT_FABRIC_SIZE=1232x816       (default 616x408)
-#   WEFT_FABRIC_GEOMETRIES="sensor plane" (default sensor; the plane at 1232x816, whose grid is that of the truth)
+#   WEFT_FABRIC_GEOMETRIES="sensor plane" (default sensor)
+#   WEFT_FABRIC_FIGURES=FILE        where each figure is kept as soon as it is known (appended to)
 set -eu
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 [ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
 [ -f "$WEFT_TEST_BIN/libweft_lens_opencv.so" ] || { echo "skipped: this build has no OpenCV"; exit 77; }
+figures=${WEFT_FABRIC_FIGURES:-$work/figures}
 seeds=${WEFT_FABRIC_SEEDS:-1} size=${WEFT_FABRIC_SIZE:-616x408}
 samples=${WEFT_FABRIC_SAMPLES:-${WEFT_TEST_SANITIZE:+satin}}
 samples=${samples:-satin corduroy}
@@ -43,7 +45,7 @@ for seed in $seeds; do
 import json, sys
 d = json.load(sys.stdin)
 print('$seed', '$sample', '$method', '$geometry', d['normal_deg']['mean'], d['normal_deg']['median'],
-      d['albedo_delta_e']['mean'])" >>../figures
+      d['albedo_delta_e']['mean'])" >>"$figures"
                 done
             done
             rm -rf "$sample.set" "$sample.truth" m.maps
@@ -52,12 +54,12 @@ print('$seed', '$sample', '$method', '$geometry', d['normal_deg']['mean'], d['no
     rm -rf "$seed"
 done
 
-python3 - "$size" <<'PY'
+python3 - "$size" "$figures" <<'PY'
 import sys
 from collections import defaultdict
 
 rows = defaultdict(dict)
-for line in open("figures"):
+for line in open(sys.argv[2]):
     seed, sample, method, geometry, mean, median, delta_e = line.split()
     rows[sample, geometry, method][seed] = (float(mean), float(median), float(delta_e))
 most = {"plain-weave": 0.7, "twill": 0.7, "satin": 1.5, "corduroy": 2.5}
