@@ -1,5 +1,6 @@
 /* weft light run: a sequence file, timed by the board. */
 #include "core/json.h"
+#include "core/log.h"
 #include "core/mem.h"
 #include "host/cli/command.h"
 #include "host/cli/device_open.h"
@@ -146,30 +147,65 @@ static json_t *result_to_json(const weft_controller_info *info, const weft_contr
 
 /* -- the command ---------------------------------------------------------------------------------------- */
 
+enum { COMES_BACK_WITHIN_S = 30, MAX_CUTS = 3 };
+
+/* A run of which the cable was pulled out begins anew when it is in again: dark meanwhile, from the first
+ * step, so that no step's lights are on without the steps before them.  A cable that falls out of each
+ * attempt is not waited for. */
+static weft_err run_whole(weft_controller *c, const weft_controller_step *steps, int n, int number, int *cuts,
+                          weft_controller_step_result *results, weft_error *err)
+{
+    for (*cuts = 0;; ++*cuts) {
+        weft_error why = {0};
+        const weft_err status = weft_controller_run_sequence(c, steps, n, results, &why);
+        if (status == WEFT_OK || !weft_controller_is_gone(c) || *cuts == MAX_CUTS) {
+            if (status != WEFT_OK && err)
+                *err = why;
+            return status;
+        }
+        weft_warn("run %d was cut off, the lights are off: %s; waiting %d s for it", number, why.text,
+                  COMES_BACK_WITHIN_S);
+        WEFT_TRY(weft_controller_reopen(c, COMES_BACK_WITHIN_S, err));
+        weft_warn("run %d begins again with its first step; what a camera took of it is void", number);
+    }
+}
+
+static json_t *run_to_json(const weft_controller_info *info, const weft_controller_step *steps, int n,
+                           const weft_controller_step_result *results)
+{
+    json_t *const run = json_array();
+    for (int i = 0; i < n; i++)
+        json_array_append_new(run, result_to_json(info, &steps[i], &results[i]));
+    return run;
+}
+
 static weft_err run_times(const weft_invocation *inv, weft_controller *c, const weft_controller_step *steps,
                           int n, int repeat, weft_error *err)
 {
     const weft_controller_info *const info = weft_controller_get_info(c);
     weft_controller_step_result results[MAX_STEPS];
-    json_t *const runs = json_array();
+    json_t *const runs = json_array(), *const cut_off = json_array();
     weft_err status = WEFT_OK;
     for (int k = 0; k < repeat && status == WEFT_OK; k++) {
-        status = weft_controller_run_sequence(c, steps, n, results, err);
+        int cuts;
+        status = run_whole(c, steps, n, k, &cuts, results, err);
         if (status != WEFT_OK)
             break;
-        if (!inv->json) {
+        if (cuts > 0)
+            json_array_append_new(cut_off, json_integer(k));
+        if (inv->json)
+            json_array_append_new(runs, run_to_json(info, steps, n, results));
+        else
             print_results(inv->out, info, steps, n, results);
-            continue;
-        }
-        json_t *const run = json_array();
-        for (int i = 0; i < n; i++)
-            json_array_append_new(run, result_to_json(info, &steps[i], &results[i]));
-        json_array_append_new(runs, run);
+        fflush(inv->out); /* for those who follow a long series */
     }
     if (status == WEFT_OK && inv->json)
-        return weft_print_json(
-            inv, json_pack("{s:I, s:o}", "tick_hz", (json_int_t)info->tick_hz, "runs", runs), err);
+        return weft_print_json(inv,
+                               json_pack("{s:I, s:o, s:o}", "tick_hz", (json_int_t)info->tick_hz, "runs",
+                                         runs, "cut_off", cut_off),
+                               err);
     json_decref(runs);
+    json_decref(cut_off);
     return status;
 }
 
@@ -214,7 +250,9 @@ const weft_command weft_cmd_light_run = {
         "pulse), \"gap_ms\" (1; dark behind it) and \"until\": \"time\", or \"exposure\" to turn the lights "
         "off\n"
         "when the camera's exposure line falls, which must happen within hold_ms.\n"
-        "\"proved\" means that the exposure line rose after settling and fell before the lights went off.",
+        "\"proved\" means that the exposure line rose after settling and fell before the lights went off.\n"
+        "When the controller is unplugged the lights go off within a second; plugged in again within 30 s,\n"
+        "the run that was cut off begins anew (\"cut_off\" of --json lists such runs, from 0).",
     .example = "weft light run ten.json --repeat 3",
     .run = run,
 };

@@ -85,6 +85,32 @@ mkdir elsewhere
 (cd elsewhere && "$weft" rig --dir ../r --tell "truth out 0.5") >tell.out || fail "truth"
 [ -f elsewhere/out/plane.maps/normal.exr ] || fail "the truth is not where the client asked for it"
 
+# A sequence that is cut off by the cable: dark, and begun again when the cable is in again.
+tell() { "$weft" rig --dir r --tell "$1" >tell.out || fail "$1"; }
+echo '{"weft":"sequence","version":1,"steps":[{"lights":[3],"hold_ms":1500},{"lights":[5],"hold_ms":20}]}' >two.json
+"$weft" light set serial WL-3 --rig r >tell.out || fail "light set"
+for try in 1 2 3; do # until the cable is pulled while the lamp is on
+    "$weft" light run two.json --rig r --json >run.out 2>run.err 9>&- &
+    run=$!
+    until tell state && jq -e '.lights_on == [3]' tell.out >lit.out; do
+        kill -0 $run 2>/dev/null || fail "light run: $(cat run.err)"
+    done
+    tell "board unplug"
+    for _ in $(seq 50); do
+        tell state
+        jq -e '.lights_on == []' tell.out >lit.out && break
+        sleep 0.02
+    done
+    jq -e '.lights_on == []' tell.out >lit.out || fail "unplugged, and still lit: $(cat tell.out)"
+    tell "board plug"
+    wait $run || fail "light run did not go on: $(cat run.err)"
+    jq -e '.cut_off == [0]' run.out >lit.out && break
+    [ $try -lt 3 ] || fail "nothing was cut off: $(cat run.out run.err)"
+done
+jq -e '.runs | length == 1 and (.[0] | length) == 2' run.out >lit.out || fail "light run: $(cat run.out)"
+grep -q 'run 0 was cut off, the lights are off: .*has vanished' run.err || fail "light run says: $(cat run.err)"
+grep -q 'run 0 begins again with its first step' run.err || fail "light run says: $(cat run.err)"
+
 # Refusals: exit 1, one line that says why.
 "$weft" rig --dir r --tell "sample tweed" >tell.out 2>tell.err && fail "an unknown sample was accepted"
 [ "$(wc -l <tell.err)" = 1 ] || fail "not one line: $(cat tell.err)"
