@@ -270,8 +270,9 @@ static void stop_waiting(weft_camera_child *child, bool polite)
 static weft_err refuse(weft_camera_child *child, const char *what, weft_error *err)
 {
     reap(child, 0);
-    return weft_fail(err, WEFT_ERR_DEVICE, "the camera's helper process (weft-camera-%s) %s and was ended",
-                     child->backend, what);
+    snprintf(child->end, sizeof child->end, "%s and was ended", what); /* the signal was ours */
+    return weft_fail(err, WEFT_ERR_DEVICE, "the camera's helper process (weft-camera-%s) %s", child->backend,
+                     child->end);
 }
 
 /* An answer, or word that the camera is armed. */
