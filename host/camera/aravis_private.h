@@ -4,6 +4,7 @@
 
 #include "host/camera/aravis_formats.h"
 #include "host/camera/camera.h"
+#include "host/camera/frame_clock.h"
 
 #include <arv.h>
 #include <stdatomic.h>
@@ -27,6 +28,7 @@ typedef struct aravis_camera {
     bool has_last_id;
     uint64_t last_id; /* of the stream's last frame */
     double triggered_s;
+    weft_frame_clock clock;      /* of the stream's frames */
     char wire_source[32];        /* the input line of WEFT_TRIGGER_WIRE */
     weft_camera_trigger trigger; /* as the device is set */
     weft_camera_region region;   /* likewise */

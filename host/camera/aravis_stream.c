@@ -35,6 +35,7 @@ void aravis_stop(aravis_camera *a)
     g_clear_object(&a->stream);
     a->stale = false;
     a->has_last_id = false;
+    a->clock = (weft_frame_clock){0};
 }
 
 static weft_err set_packet_size(aravis_camera *a, weft_error *err)
@@ -194,38 +195,76 @@ static uint64_t uncalled(const aravis_camera *a, uint64_t id)
     return id - a->last_id - 1;
 }
 
-/* The socket buffer grows only when the first frame's leader has come, so the first frame often lacks
- * packets: take one with the shortest exposure and forget it. */
-static weft_err throw_one_away(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context,
-                               weft_error *err)
+/* The camera's clock at the begin of a frame's exposure; 0: it does not tell. */
+static double stamp_of(ArvBuffer *buffer)
 {
-    ArvBuffer *buffer = NULL;
+    return arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS
+               ? 1e-9 * (double)arv_buffer_get_timestamp(buffer)
+               : 0;
+}
+
+/* A frame was ours. */
+static void learn_clock(aravis_camera *a, ArvBuffer *buffer)
+{
+    const double stamp_s = stamp_of(buffer);
+    if (stamp_s > 0)
+        weft_frame_clock_learn(&a->clock, stamp_s, a->triggered_s);
+}
+
+/* Frames of the shortest exposure that are forgotten.  The socket buffer grows only when the first frame's
+ * leader has come, so that one often lacks packets; the others tell how the camera's clock stands.  A frame
+ * among them that nobody asked for would spoil that. */
+static weft_err throw_some_away(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context, bool *good,
+                                weft_error *err)
+{
+    enum { FRAMES = 3 };
+    *good = true;
+    for (int i = 0; i < FRAMES && *good; i++) {
+        ArvBuffer *buffer = NULL;
+        WEFT_TRY(take(a, WEFT_TRIGGER_SOFTWARE, FIRST_FRAME_S,
+                      a->trigger == WEFT_TRIGGER_WIRE ? NULL : idle, /* a call of idle would mean "armed" */
+                      idle_context, &buffer, err));
+        *good = buffer && (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS ||
+                           uncalled(a, arv_buffer_get_frame_id(buffer)) == 0);
+        if (!buffer)
+            return WEFT_OK;
+        learn_clock(a, buffer);
+        note_id(a, buffer);
+        arv_stream_push_buffer(a->stream, buffer);
+    }
+    return WEFT_OK;
+}
+
+static weft_err warm_up(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context, bool *good,
+                        weft_error *err)
+{
     double achieved_s;
     WEFT_TRY(aravis_set_exposure(a, a->exposure_min_s, &achieved_s, err));
-    if (a->trigger == WEFT_TRIGGER_WIRE) /* nobody would send a pulse for this one */
+    if (a->trigger == WEFT_TRIGGER_WIRE) /* nobody would send a pulse for these */
         WEFT_TRY(aravis_set_trigger_source(a, "Software", err));
-    WEFT_TRY(take(a, WEFT_TRIGGER_SOFTWARE, FIRST_FRAME_S, a->trigger == WEFT_TRIGGER_WIRE ? NULL : idle,
-                  idle_context, &buffer, err)); /* a call of idle would mean "armed" */
+    WEFT_TRY(throw_some_away(a, idle, idle_context, good, err));
     if (a->trigger == WEFT_TRIGGER_WIRE)
         WEFT_TRY(aravis_set_trigger_source(a, a->wire_source, err));
-    if (buffer)
-        note_id(a, buffer);
-    if (buffer)
-        arv_stream_push_buffer(a->stream, buffer);
     return aravis_set_exposure(a, a->set.exposure_s, &achieved_s, err);
 }
 
 static weft_err start(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_context, weft_error *err)
 {
-    enum { TRIES = 2 };
-    for (int i = 0; i < TRIES; i++) {
+    enum { TRIES = 3, SILENT_TRIES = 2 };
+    bool good, strayed = false;
+    for (int i = 0; i < (strayed ? TRIES : SILENT_TRIES); i++) {
         WEFT_TRY(create_stream(a, err));
         ARAVIS_TRY(a, "starting the stream", arv_camera_start_acquisition(a->camera, &error));
-        WEFT_TRY(throw_one_away(a, idle, idle_context, err));
-        if (!a->stale)
+        WEFT_TRY(warm_up(a, idle, idle_context, &good, err));
+        if (good)
             return WEFT_OK;
+        strayed = !a->stale;
         aravis_stop(a);
     }
+    if (strayed)
+        return weft_fail(err, WEFT_ERR_DEVICE,
+                         "camera %s: sends frames that nobody asked for; find what else is triggering it",
+                         a->address);
     return weft_fail(
         err, WEFT_ERR_TIMEOUT,
         "camera %s: answers, but none of its frames arrives; let a firewall pass UDP from it, and "
@@ -272,11 +311,18 @@ static bool is_uncalled(const aravis_camera *a, ArvBuffer *buffer, double age_s,
 {
     const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
     const uint64_t n = whole ? uncalled(a, arv_buffer_get_frame_id(buffer)) : 0;
+    const double stamp_s = stamp_of(buffer);
+    const double early_s = stamp_s > 0 ? weft_frame_clock_early(&a->clock, stamp_s, a->triggered_s) : 0;
     if (n > 0)
         snprintf(reason, REASON_SIZE,
                  "the camera counts %" PRIu64
                  " frames that nobody asked for: is something else triggering it?",
                  n);
+    else if (early_s > 0)
+        snprintf(reason, REASON_SIZE,
+                 "a frame came that nobody asked for, begun %.0f ms before its trigger: is something else "
+                 "triggering the camera?",
+                 1e3 * early_s);
     else if (age_s < a->set.exposure_s - EARLY_S)
         snprintf(reason, REASON_SIZE,
                  "a frame came that nobody asked for, %.2f s after the trigger of an exposure of %.2f s: is "
@@ -356,6 +402,7 @@ weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle
         a->stale = true; /* whose frame comes next is not known either */
     } else if (is_whole(a, buffer, missing_packets(a) - missing_before, frame->reason)) {
         frame->status = WEFT_FRAME_COMPLETE;
+        learn_clock(a, buffer);
         status = fill_mosaic(a, buffer, &frame->mosaic, err);
     } else {
         frame->status = WEFT_FRAME_INCOMPLETE;

@@ -76,15 +76,20 @@ wait %2 2>/dev/null
 sleep 4
 row "camera answers nothing for a while"
 
+"${capture[@]}" "$dir/calm.set" >/dev/null || fail "a set without stray frames"
 "${capture[@]}" --settle 0.2 "$dir/stray.set" >/dev/null 2>"$dir/err" 9>&- &
 pid=$!
 wait_for_frames "$dir/stray.set" 2
-for _ in 1 2 3; do
+for pause in 0.09 0.05 0.07; do
     tell "camera stray" >/dev/null
-    sleep 0.09
+    sleep $pause
 done
 wait $pid || fail "stray frames: $(cat "$dir/err")"
 check_files "$dir/stray.set" complete 11
+jq -e --slurpfile calm "$dir/calm.set/set.json" '[.frames[] | select(.role == "light") | .light as $l
+    | .capture.statistics.mean[1] / ($calm[0].frames[] | select(.light == $l) | .capture.statistics.mean[1])]
+    | length == 10 and min > 0.99 and max < 1.01' "$dir/stray.set/set.json" >/dev/null ||
+    fail "stray frames: a light is not as bright as without them"
 retried "$dir/stray.set" "that nobody asked for"
 row "sequence gap"
 

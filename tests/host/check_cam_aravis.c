@@ -192,6 +192,51 @@ static void test_a_frame_that_nobody_asked_for_is_noticed(void **state)
     weft_camera_close(camera);
 }
 
+/* A frame that is under way when ours is called comes with the number that ours should have, and after a time
+ * that ours could have taken: only the camera's clock tells them apart. */
+static void test_a_frame_under_way_is_not_taken_for_ours(void **state)
+{
+    (void)state;
+    weft_camera_device *camera = NULL;
+    weft_captured_frame frame = {0};
+    fake_camera_start(&fake, "BayerRG16", "64x64");
+    assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
+    for (int i = 0; i < 3; i++) {
+        expose_whole(camera, &frame);
+        const int before = frame.mosaic.data[0]; /* it counts frames */
+        fake_camera_tell(&fake, "delay 150");
+        fake_camera_tell(&fake, "stray");
+        g_usleep(30000);
+        assert_ok(weft_camera_expose(camera, DEADLINE_S, &frame, err));
+        assert_int_equal(frame.status, WEFT_FRAME_INCOMPLETE);
+        assert_non_null(strstr(frame.reason, "that nobody asked for"));
+        fake_camera_tell(&fake, "delay 0");
+        expose_whole(camera, &frame);
+        assert_true(frame.mosaic.data[0] - before >=
+                    5); /* neither the stray one nor that which we called after it */
+    }
+    weft_mosaic_fini(&frame.mosaic);
+    weft_camera_close(camera);
+}
+
+static void test_clocks(void **state)
+{
+    (void)state;
+    weft_frame_clock clock = {0};
+    const double offset_s = -1e6; /* of the camera's clock, which runs 1e-4 faster */
+    assert_near(weft_frame_clock_early(&clock, 5, 100), 0, 0);
+    for (int i = 0; i < 40; i++) {
+        const double at_s = 100 + 10 * i,
+                     delay_s = i % 3 < 2 ? 0.0005 : 0.03; /* now and then the computer is busy */
+        const double stamp_s = offset_s + at_s * (1 + 1e-4) + delay_s;
+        assert_near(weft_frame_clock_early(&clock, stamp_s, at_s), 0, 0); /* ours is never refused */
+        /* one that was begun 50 ms before it: the eight frames before go back 80 s, and the clocks 8 ms */
+        if (i > 0)
+            assert_near(weft_frame_clock_early(&clock, stamp_s - 0.05, at_s), 0.05 - delay_s - 0.004, 0.005);
+        weft_frame_clock_learn(&clock, stamp_s, at_s);
+    }
+}
+
 static void test_another_format_than_agreed_is_refused(void **state)
 {
     (void)state;
@@ -387,6 +432,8 @@ int main(void)
         cmocka_unit_test_teardown(test_what_the_address_may_ask_for, end_fake),
         cmocka_unit_test(test_every_status_has_its_remedy),
         cmocka_unit_test_teardown(test_a_frame_that_nobody_asked_for_is_noticed, end_fake),
+        cmocka_unit_test(test_clocks),
+        cmocka_unit_test_teardown(test_a_frame_under_way_is_not_taken_for_ours, end_fake),
         cmocka_unit_test_teardown(test_another_format_than_agreed_is_refused, end_fake),
         cmocka_unit_test_teardown(test_a_pulse_that_never_comes, end_fake),
         cmocka_unit_test_teardown(test_no_raw_format, end_fake),
