@@ -273,8 +273,10 @@ static weft_err run(const weft_invocation *inv, const void *vargs, weft_error *e
         session.cal.has_linearity = true;
         json_t *noise = NULL, *const told = report(&session, &args->chart, &j);
         status = weft_sensor_report(&session.set, j.n_series ? j.series.offset : NULL, &noise, err);
-        if (noise)
+        if (noise) {
             json_object_set_new(told, "noise", noise);
+            json_object_set_new(told, "noise_gain", json_real(session.set.frames[0].gain));
+        }
         if (status == WEFT_OK)
             status = weft_calibration_set_report(&session.cal, "linearity", told, err);
         else

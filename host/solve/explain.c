@@ -348,8 +348,10 @@ weft_err weft_solve_explain(const weft_set *set, const weft_calibration *cal, co
                                        : options->linear ? WEFT_READ_LINEAR
                                                          : WEFT_READ_SITES;
     weft_err status = w ? weft_light_plates_load(set, reading, &plates, err) : WEFT_ERR_NOMEM;
-    if (status == WEFT_OK)
+    if (status == WEFT_OK) {
+        weft_light_plates_know_noise(&plates, set, cal);
         status = explain_with(set, cal, options, pixel, &plates, w, &e, err);
+    }
     weft_light_plates_fini(&plates);
     weft_free(w);
     if (status == WEFT_OK)

@@ -1,5 +1,7 @@
 #include "host/solve/light_plates.h"
 
+#include "calibration/calibration_report.h"
+
 #include "core/progress.h"
 
 #include <math.h>
@@ -89,6 +91,51 @@ weft_err weft_light_plates_load(const weft_set *set, weft_light_reading reading,
     p->width = p->plate[0].image.width;
     p->height = p->plate[0].image.height;
     return WEFT_OK;
+}
+
+/* Photon transfer of the four sites, averaged, in parts of full scale.  @return its gain; 0: there is none */
+static double transferred_noise(const weft_set *set, const weft_calibration *cal, weft_noise *noise)
+{
+    const json_t *const report = weft_calibration_get_report(cal, "linearity"), *const sites =
+                                                                                    json_object_get(report,
+                                                                                                    "noise");
+    const double range = set->white - set->black[0],
+                 gain = json_number_value(json_object_get(report, "noise_gain"));
+    const size_t n = json_array_size(sites);
+    *noise = (weft_noise){0};
+    for (size_t i = 0; i < n; i++) {
+        const json_t *const site = json_array_get(sites, i);
+        const double e_per_dn = json_number_value(json_object_get(site, "gain_e_per_dn")),
+                     read_e = json_number_value(json_object_get(site, "read_noise_e"));
+        if (!(e_per_dn > 0) || !(read_e >= 0) || !(range > 0))
+            return 0;
+        noise->shot += 1 / (e_per_dn * range) / (double)n;
+        noise->read += pow(read_e / (e_per_dn * range), 2) / (double)n;
+    }
+    return n ? (gain > 0 ? gain : 1) : 0;
+}
+
+void weft_light_plates_know_noise(weft_light_plates *plates, const weft_set *set, const weft_calibration *cal)
+{
+    weft_noise noise = set->noise;
+    double measured_at = set->noise_gain, used = 0;
+    int frames[WEFT_LIGHTS_MAX] = {0};
+    if (!(measured_at > 0))
+        measured_at = transferred_noise(set, cal, &noise);
+    if (!(measured_at > 0))
+        return;
+    for (int i = 0; i < set->n_frames; i++)
+        if (set->frames[i].role == WEFT_ROLE_LIGHT) {
+            used = fmax(used, set->frames[i].gain);
+            frames[set->frames[i].light]++;
+        }
+    noise.shot *= used / measured_at;
+    noise.read *= pow(used / measured_at, 2);
+    plates->noise = noise;
+    for (int j = 0; j < plates->n; j++)
+        if (frames[j] == 1) /* a lit frame's darkest tenth is an upper bound; a bracket knows better */
+            plates->plate[j].noise_floor =
+                fmin(plates->plate[j].noise_floor, sqrt(noise.read) / plates->time[j]);
 }
 
 void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_row_in in[WEFT_LIGHTS_MAX])

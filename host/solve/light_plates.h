@@ -2,6 +2,7 @@
 #ifndef WEFT_HOST_SOLVE_LIGHT_PLATES_H
 #define WEFT_HOST_SOLVE_LIGHT_PLATES_H
 
+#include "calibration/calibration.h"
 #include "host/set/noise.h"
 #include "host/set/plate.h"
 #include "host/solve/solve_row.h"
@@ -32,6 +33,17 @@ typedef enum weft_light_reading {
 weft_err weft_light_plates_load(const weft_set *set, weft_light_reading reading, weft_light_plates *plates,
                                 weft_error *err);
 void weft_light_plates_fini(weft_light_plates *plates);
+
+/**
+ * Takes the noise of a frame from `sensor.noise` of the set, or from the photon transfer that
+ * `weft calibrate linearity` measured, so that a sample's variance follows from its own value.  The fixed
+ * pattern is no noise here: it is the same under every light and becomes albedo.  Shot noise grows with the
+ * analogue gain, read noise with its square.
+ *
+ * Without either the noise of a light's darkest tenth, which each plate was read with, stands for all values.
+ */
+void weft_light_plates_know_noise(weft_light_plates *plates, const weft_set *set,
+                                  const weft_calibration *cal);
 
 /** Points at row `row` of every light. */
 void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_row_in in[WEFT_LIGHTS_MAX]);

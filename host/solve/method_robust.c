@@ -28,6 +28,18 @@ WEFT_INLINE void solve_weighted(const weft_solve_samples *s, const weft_lane_wei
         weft_lane_solve(t, k, scaled, a);
 }
 
+/* Where lights were left out, what the others say may be of the same kind: they may miss Lambert's law by the
+ * 2 % that are allowed, the more so the fewer are left to contradict each other.  The factor is fitted to the
+ * virtual scanner's fabrics (docs/solving.md). */
+WEFT_INLINE void doubt(const weft_lane_sums *t, const weft_lane_normals *scaled, const weft_lane_misfits *m,
+                       float n_lights, int k, weft_solve_answers *a)
+{
+    const float spare = t->n[k] > 3.5F ? t->n[k] - 3 : 0.5F, fewer = n_lights / spare - 1;
+    const float tolerance = WEFT_SOLVE_MISFIT * m->brightest[k] * (fewer > 0 ? fewer : 0.0F);
+    const float doubt2 = tolerance * tolerance * scaled->spread[k];
+    a->angle[k] = sqrtf(a->angle[k] * a->angle[k] + (doubt2 > 0 ? doubt2 : 0.0F));
+}
+
 WEFT_INLINE void judge(const weft_solve_samples *s, const weft_lane_weights *weights, const weft_lane_sums *t,
                        const weft_lane_normals *scaled, const weft_lane_misfits *m,
                        const float dropped[WEFT_LANES], const float mark[WEFT_LANES], weft_solve_answers *a)
@@ -36,6 +48,8 @@ WEFT_INLINE void judge(const weft_solve_samples *s, const weft_lane_weights *wei
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++) {
         weft_lane_judge(t, scaled, m, k, a);
+        if (dropped[k] + mark[k] > 0)
+            doubt(t, scaled, m, (float)s->n_lights, k, a);
         a->quality[k] = weft_lane_quality(s, scaled, k) |
                         (dropped[k] > 0 ? (uint32_t)WEFT_QUALITY_SHADOWED : 0U) |
                         (mark[k] > 0 ? (uint32_t)WEFT_QUALITY_NOT_LAMBERTIAN : 0U);

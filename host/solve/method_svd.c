@@ -117,6 +117,16 @@ static void answer_albedo(const weft_solve_samples *s, int k, const pixel *p, co
     }
 }
 
+/* Variance of a sample: the noise counts as eight samples beside the residuals, or as none where they are
+ * three sigma above it; where it is not known the prior counts as two. */
+static double sample_variance(double squares, double noise, double prior2, int n)
+{
+    const double dof = n - 3;
+    if (!(noise > 0))
+        return (squares + 2 * prior2) / (dof + 2);
+    return squares > noise * (dof + 3 * sqrt(2 * dof)) ? squares / dof : (squares + 8 * noise) / (dof + 8);
+}
+
 /* The formulas of weft_lane_judge() and its neighbours, from the singular values. */
 static void answer_quality(const weft_solve_samples *s, int k, const pixel *p, const double n[3],
                            double length, weft_solve_answers *a)
@@ -138,7 +148,7 @@ static void answer_quality(const weft_solve_samples *s, int k, const pixel *p, c
     const double prior2 = pow((double)WEFT_SOLVE_PRIOR_MISFIT * peak, 2);
     const double angle2 = (squares + prior2) / (p->n - 2) * spread / (length * length);
     const double half2 = pow((double)WEFT_SOLVE_HALF_CONFIDENCE, 2);
-    const double sample2 = (squares + 2 * (noise > 0 ? noise : prior2)) / (p->n - 1);
+    const double sample2 = sample_variance(squares, noise, prior2, p->n);
     const double limit2 = noise + pow((double)WEFT_SOLVE_MISFIT * peak, 2);
     a->residual[k] = (float)(sqrt(squares / p->n) / peak);
     a->confidence[k] = (float)(half2 / (half2 + angle2));

@@ -210,11 +210,26 @@ WEFT_INLINE void weft_lane_measure(const weft_solve_samples *s, const weft_lane_
     *to = m;
 }
 
+/** How many samples the camera's noise counts for, where it is known, beside the residuals. */
+#define WEFT_SOLVE_KNOWN_NOISE 8.0F
+
+/** Variance of a sample of a pixel whose residuals' squares sum to `squares` over n samples.
+ *  @param noise  its variance by the camera's noise; 0: not known, then `prior` is taken */
+WEFT_INLINE float weft_sample_variance(float squares, float noise, float prior, float n)
+{
+    const float weight = noise > 0 ? WEFT_SOLVE_KNOWN_NOISE : 2.0F, dof = n > 3 ? n - 3 : 0.0F;
+    const float pooled = (squares + weight * (noise > 0 ? noise : prior)) / (dof + weight);
+    /* chi^2 three sigma above its mean */
+    const int more = noise > 0 && dof > 0 && squares > noise * (dof + 3 * sqrtf(2 * dof));
+    return more ? squares / dof : pooled;
+}
+
 /**
  * Residual, confidence, expected error and number of lights of one lane (docs/solving.md).
  *
- * The expected error takes the variance of a sample from the residuals and from the camera's noise, which
- * counts as much as two samples; where the noise is not known, 2 % of the brightest fit stand for it.
+ * The expected error takes the variance of a sample from the camera's noise and the residuals together, the
+ * noise counting as much as eight samples; from the residuals alone where they are larger than noise can make
+ * them.  Where the noise is not known, 2 % of the brightest fit stand for it and count as two samples.
  */
 WEFT_INLINE void weft_lane_judge(const weft_lane_sums *all, const weft_lane_normals *scaled,
                                  const weft_lane_misfits *m, int k, weft_solve_answers *a)
@@ -229,8 +244,8 @@ WEFT_INLINE void weft_lane_judge(const weft_lane_sums *all, const weft_lane_norm
     a->residual[k] = lit * sqrtf(m->squares[k] / count) / peak;
     a->confidence[k] = lit * half2 / (half2 + (angle2 > 0 ? angle2 : 0.0F));
 
-    const float noise = m->variance[k] > 0 ? m->variance[k] / count : prior * prior;
-    const float expected2 = (m->squares[k] + 2 * noise) / (count - 1) * scaled->spread[k];
+    const float expected2 =
+        weft_sample_variance(m->squares[k], m->variance[k] / count, prior * prior, count) * scaled->spread[k];
     a->angle[k] = lit > 0 ? sqrtf(expected2 > 0 ? expected2 : 0.0F) : 0.0F;
     a->n_used[k] = a->valid[k] > 0 ? all->n[k] : 0.0F;
 }

@@ -181,6 +181,8 @@ weft_err weft_relight_set(const weft_set *set, const weft_calibration *cal, cons
     WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
     weft_err status =
         weft_light_plates_load(set, options->half ? WEFT_READ_HALF : WEFT_READ_SITES, &plates, err);
+    if (status == WEFT_OK)
+        weft_light_plates_know_noise(&plates, set, cal);
     if (status == WEFT_OK && set->mask_file && !options->half)
         status = weft_set_load_mask(set, &inside, err);
     if (status == WEFT_OK)

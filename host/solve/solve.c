@@ -290,8 +290,10 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
                                         &plates, err);
     run->seconds.read = weft_clock_s() - clock;
     clock = weft_clock_s();
-    if (status == WEFT_OK)
+    if (status == WEFT_OK) {
+        weft_light_plates_know_noise(&plates, set, cal);
         status = follow_drift(set, &plates, pixel, &drifted, run, err);
+    }
     if (status == WEFT_OK)
         status = weft_incidence_init(&incidence, &drifted, plates.width, plates.height, pixel,
                                      options->height_mm, err);

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "host/set/compare.h"
+#include "host/solve/light_plates.h"
 #include "host/solve/relight.h"
 #include "host/solve/solve.h"
 #include "tests/host/dome.h"
@@ -257,6 +258,36 @@ static void test_ambient_is_subtracted(void **state)
     weft_maps_fini(&maps);
 }
 
+/* What the set recorded at another analogue gain, or what the calibration measured. */
+static void test_noise_is_the_sensors(void **state)
+{
+    (void)state;
+    weft_light_plates plates = {0};
+    weft_solve_row_in in[WEFT_LIGHTS_MAX];
+    weft_set set = made;
+    weft_calibration measured = cal;
+    assert_ok(weft_light_plates_load(&made, WEFT_READ_SITES, &plates, err));
+    const double floor = plates.plate[0].noise_floor;
+    weft_light_plates_know_noise(&plates, &set, &cal);
+    assert_true(plates.noise.shot == 0 && plates.plate[0].noise_floor == floor);
+
+    set.noise = (weft_noise){4e-12, 1e-4};
+    set.noise_gain = 2;
+    weft_light_plates_know_noise(&plates, &set, &cal);
+    weft_light_plates_row(&plates, 3, in);
+    assert_near((double)in[0].shot, 0.5e-4 / EXPOSURE, 1e-9);
+    assert_near((double)in[0].read, 1e-12 / (EXPOSURE * EXPOSURE), 1e-14);
+
+    set.noise_gain = 0;
+    measured.other = json_pack("{s:{s:{s:f, s:[{s:f, s:f}]}}}", "reports", "linearity", "noise_gain", 1.0,
+                               "noise", "gain_e_per_dn", 2.0, "read_noise_e", 3.0);
+    weft_light_plates_know_noise(&plates, &set, &measured);
+    assert_near(plates.noise.shot, 1 / (2 * (WHITE - BLACK)), 1e-12);
+    assert_near(plates.noise.read, pow(1.5 / (WHITE - BLACK), 2), 1e-15);
+    json_decref(measured.other);
+    weft_light_plates_fini(&plates);
+}
+
 static void test_refuses_what_does_not_fit(void **state)
 {
     (void)state;
@@ -455,6 +486,7 @@ int main(void)
         cmocka_unit_test(test_maps_say_how_they_were_made),
         cmocka_unit_test(test_mask_and_same_bits),
         cmocka_unit_test(test_ambient_is_subtracted),
+        cmocka_unit_test(test_noise_is_the_sensors),
         cmocka_unit_test(test_refuses_what_does_not_fit),
         cmocka_unit_test(test_damaged_frame_is_named),
         cmocka_unit_test(test_black_frames_have_no_answer),
