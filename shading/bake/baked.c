@@ -64,6 +64,28 @@ void weft_baked_fini(weft_baked *baked)
     *baked = (weft_baked){0};
 }
 
+weft_err weft_baked_copy(const weft_baked *from, weft_baked *to, weft_error *err)
+{
+    WEFT_TRY(weft_baked_init(to, from->name, from->type, err));
+    weft_err status = WEFT_OK;
+    to->width = from->width;
+    to->height = from->height;
+    memcpy(to->size_mm, from->size_mm, sizeof to->size_mm);
+    to->periodic = from->periodic;
+    to->enable_diffuse = from->enable_diffuse;
+    to->enable_specular = from->enable_specular;
+    to->two_lobes = from->two_lobes;
+    for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK; k++) {
+        memcpy(to->maps[k].constant, from->maps[k].constant, sizeof to->maps[k].constant);
+        if (from->maps[k].n_mips > 0)
+            status = weft_image_copy(&to->maps[k].mips[0], &from->maps[k].mips[0], err);
+        to->maps[k].n_mips = from->maps[k].n_mips > 0 && status == WEFT_OK;
+    }
+    if (status != WEFT_OK)
+        weft_baked_fini(to);
+    return status;
+}
+
 int weft_baked_levels(int width, int height)
 {
     int levels = 1;

@@ -81,6 +81,9 @@ weft_err weft_baked_init(weft_baked *baked, const char *name, const weft_materia
 /** Frees everything; `{0}` is fine. */
 void weft_baked_fini(weft_baked *baked);
 
+/** A copy of the constants and of level 0 of the maps.  @param to  initialised here */
+weft_err weft_baked_copy(const weft_baked *from, weft_baked *to, weft_error *err);
+
 /** Number of levels of a w x h map, down to 1 x 1. */
 int weft_baked_levels(int width, int height);
 

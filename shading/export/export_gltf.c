@@ -381,9 +381,11 @@ static weft_err add_material(glb *g, weft_error *err)
     }
     if (json_array_size(used) > 0)
         json_object_set(g->root, "extensionsUsed", used);
-    json_object_set_new(material, "extras",
-                        json_pack("{s:o, s:s}", "size_mm", numbers(g->baked->size_mm, 2), "model",
-                                  weft_baked_brdf(g->baked)));
+    json_t *const extras =
+        json_pack("{s:o, s:s}", "size_mm", numbers(g->baked->size_mm, 2), "model", weft_baked_brdf(g->baked));
+    if (g->job->has_layers)
+        json_object_set_new(extras, "runtime_layers", json_string("layers/layers.json"));
+    json_object_set_new(material, "extras", extras);
     json_decref(used);
     json_decref(extensions);
     return status;

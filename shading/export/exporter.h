@@ -13,6 +13,7 @@ typedef struct weft_export_job {
     const weft_baked *baked;
     const char *folder; /* exists and is empty: the caller publishes it whole */
     json_t *lost;       /* array: a sentence for each thing that the format cannot carry */
+    bool has_layers;    /* layers/layers.json will lie beside (export_layers.h); may be pointed at */
 } weft_export_job;
 
 typedef struct weft_exporter {

@@ -9,6 +9,7 @@
 #include "shading/bake/material_file.h"
 #include "shading/bake/relief.h"
 #include "shading/bake/toksvig.h"
+#include "shading/export/export_layers.h"
 #include "shading/material/build_key.h"
 
 #include <dirent.h>
@@ -18,7 +19,7 @@
 #include <string.h>
 
 /* Raised when the code of a step changes what it makes. */
-enum { COMPOSITE_VERSION = 2, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
+enum { COMPOSITE_VERSION = 3, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
 
 enum { CAVITY_RADIUS_PX = 8 };
 
@@ -525,6 +526,12 @@ static weft_err make_maps(builder *b, weft_error *err)
 
 /* -- exports ------------------------------------------------------------------------------------------ */
 
+static bool has_runtime_layers(const builder *b)
+{
+    const weft_rad_member *const list = weft_rad_at(&b->asset->properties, "runtime_layers");
+    return list && list->value->items;
+}
+
 static void key_export(const builder *b, const weft_exporter *exporter, char hex[65])
 {
     weft_build_key key = weft_build_key_begin(exporter->name, exporter->version);
@@ -539,6 +546,8 @@ static void key_export(const builder *b, const weft_exporter *exporter, char hex
     if (weft_rad_at(&b->asset->properties, "u3m")) /* what of it no map holds is exported too */
         json_object_foreach(b->inputs, path, input)
             weft_build_key_text(&key, path, json_string_value(json_object_get(input, "sha256")));
+    if (has_runtime_layers(b)) /* what a mask hides in the flattened maps is exported too */
+        weft_build_key_text(&key, "runtime layers", b->composite_key);
     weft_build_key_text(&key, "name", b->baked.name);
     weft_build_key_text(&key, "type", b->baked.type->name);
     weft_build_key_number(&key, "width_mm", b->baked.size_mm[0]);
@@ -556,8 +565,9 @@ static json_t *average_glosses(const weft_baked *whole)
     return weft_json_numbers(gloss, n);
 }
 
+/* @param layers  n is 0: there are none */
 static weft_err export_one(builder *b, const weft_exporter *exporter, const weft_baked *whole,
-                           weft_error *err)
+                           const weft_runtime_layers *layers, weft_error *err)
 {
     char *const folder = weft_path_join(b->options->folder, exporter->name, err);
     weft_atomic a = {0};
@@ -565,8 +575,10 @@ static weft_err export_one(builder *b, const weft_exporter *exporter, const weft
         return WEFT_ERR_NOMEM;
     weft_err status = weft_atomic_folder_begin(&a, folder, true, err);
     if (status == WEFT_OK) {
-        const weft_export_job job = {whole, a.temp_path, json_array()};
+        const weft_export_job job = {whole, a.temp_path, json_array(), layers->n > 0};
         status = exporter->write(&job, err);
+        if (status == WEFT_OK && layers->n > 0)
+            status = weft_export_runtime_layers(exporter, &job, layers, err);
         char *const lost = weft_path_join(a.temp_path, "report.json", err);
         json_t *const report = json_pack(
             "{s:s, s:s, s:o, s:o, s:o, s:O, s:O}", "exporter", exporter->name, "material", whole->name,
@@ -585,10 +597,23 @@ static weft_err export_one(builder *b, const weft_exporter *exporter, const weft
     return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "export %s", exporter->name);
 }
 
+/* Base and layers with mips of their own: an engine filters each by itself. */
+static weft_err make_runtime_layers(builder *b, weft_runtime_layers *layers, weft_error *err)
+{
+    if (!has_runtime_layers(b))
+        return WEFT_OK;
+    WEFT_TRY(weft_composite_runtime(b->assets, b->asset, &b->options->composite, layers, err));
+    weft_err status = weft_mips_make(&layers->base, &b->options->mips, err);
+    for (int k = 0; k < layers->n && status == WEFT_OK; k++)
+        status = weft_mips_make(&layers->layers[k].baked, &b->options->mips, err);
+    return status;
+}
+
 /* Exporters read the files, not what is in memory: the same bytes whether or not something was rebuilt. */
 static weft_err make_exports(builder *b, weft_error *err)
 {
     weft_baked whole = {0};
+    weft_runtime_layers layers = {0};
     weft_err status = WEFT_OK;
     for (const weft_exporter *const *e = b->options->exporters; e && *e && status == WEFT_OK; e++) {
         char hex[65], step[80];
@@ -606,12 +631,15 @@ static weft_err make_exports(builder *b, weft_error *err)
             status = weft_material_load(b->options->folder, &whole, err);
             if (status == WEFT_OK)
                 status = weft_composite_u3m(b->asset, &whole.u3m, err);
+            if (status == WEFT_OK)
+                status = make_runtime_layers(b, &layers, err);
         }
         if (status == WEFT_OK)
-            status = export_one(b, *e, &whole, err);
+            status = export_one(b, *e, &whole, &layers, err);
         if (status == WEFT_OK)
             status = finish(b, step, hex, err);
     }
+    weft_runtime_layers_fini(&layers);
     weft_baked_fini(&whole);
     return status;
 }

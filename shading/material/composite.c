@@ -39,12 +39,23 @@ static const texture_row textures[] = {
     {"opacity_map", WEFT_TEXTURE_SCALAR, WEFT_BAKED_OPACITY, true},
 };
 
+void weft_runtime_layers_fini(weft_runtime_layers *layers)
+{
+    weft_baked_fini(&layers->base);
+    for (int k = 0; k < WEFT_RUNTIME_LAYERS_MAX; k++) {
+        weft_baked_fini(&layers->layers[k].baked);
+        weft_image_fini(&layers->layers[k].alpha);
+    }
+    *layers = (weft_runtime_layers){0};
+}
+
 typedef struct compositor {
     weft_assets *assets;
     const weft_composite_options *options;
     int width, height;
     double size_mm[2];
     bool periodic;
+    weft_runtime_layers *runtime; /* gets the outermost material's; NULL: nobody asks */
 } compositor;
 
 /* The property, unless it comes from `inherited` or from what that derives from; NULL: whoever set it. */
@@ -488,8 +499,38 @@ static unsigned channels_of(const weft_rad_record *p)
     return WEFT_BLEND_ALL;
 }
 
+/* The library's name, or with a number where the layer sets anything of the material itself. */
+static void name_layer(const weft_rad_value *item, int index, weft_runtime_layer *layer)
+{
+    static const char *const of_layers[] = {"alpha", "mask", "channels", "blend"};
+    bool is_own = false;
+    for (const weft_rad_member *m = item->record.members; m; m = m->next) {
+        bool known = false;
+        for (int k = 0; k < 4; k++)
+            known = known || strcmp(m->name, of_layers[k]) == 0;
+        is_own = is_own || !known;
+    }
+    if (is_own)
+        (void)snprintf(layer->name, sizeof layer->name, "%.100s_%d", item->record.base, index);
+    else
+        (void)snprintf(layer->name, sizeof layer->name, "%.100s", item->record.base);
+}
+
+/* Keeps a layer as it was laid: `above` and `mask` are taken over. */
+static void keep_layer(weft_runtime_layer *to, weft_baked *above, weft_image *mask, float alpha)
+{
+    to->baked = *above;
+    to->alpha = *mask;
+    to->constant = alpha;
+    *above = (weft_baked){0};
+    *mask = (weft_image){0};
+    for (size_t i = 0; to->alpha.planes && i < weft_image_plane_size(&to->alpha); i++)
+        to->alpha.data[i] = fminf(fmaxf(alpha * to->alpha.data[i], 0), 1);
+}
+
+/* @param keep  gets the layer; NULL: nobody asks */
 static weft_err lay(const compositor *c, const weft_rad_value *item, int depth, weft_baked *below,
-                    weft_error *err)
+                    weft_runtime_layer *keep, weft_error *err)
 {
     weft_asset layer;
     weft_baked above = {0};
@@ -499,15 +540,40 @@ static weft_err lay(const compositor *c, const weft_rad_value *item, int depth, 
     const weft_rad_member *const record = weft_rad_at(&layer.properties, "mask");
     if (status == WEFT_OK && record)
         status = weft_mask_make(&record->value->record, below, &mask, err);
+    const double alpha = weft_rad_number(&layer.properties, "alpha", 1);
+    const unsigned channels = channels_of(&layer.properties);
+    const bool reorient = strcmp(weft_rad_text(&layer.properties, "blend", "slope"), "rnm") == 0;
     if (status == WEFT_OK)
-        status = weft_blend(below, &above, mask.planes ? mask.data : NULL,
-                            weft_rad_number(&layer.properties, "alpha", 1), channels_of(&layer.properties),
-                            strcmp(weft_rad_text(&layer.properties, "blend", "slope"), "rnm") == 0, err);
+        status = weft_blend(below, &above, mask.planes ? mask.data : NULL, alpha, channels, reorient, err);
+    if (status == WEFT_OK && keep) {
+        keep->channels = channels;
+        keep->reorient = reorient;
+        keep_layer(keep, &above, &mask, (float)alpha);
+    }
     if (status != WEFT_OK)
         weft_prefix(err, status, "%s: layer '%s'", weft_place_text(item->place), item->record.base);
     weft_image_fini(&mask);
     weft_baked_fini(&above);
     return status;
+}
+
+/* What an engine would blend lies over everything else; here it is flattened. */
+static weft_err lay_runtime(const compositor *c, const weft_asset *asset, int depth, weft_baked *baked,
+                            weft_error *err)
+{
+    const weft_rad_member *const list = weft_rad_at(&asset->properties, "runtime_layers");
+    weft_runtime_layers *const keep = depth == 0 ? c->runtime : NULL;
+    const weft_rad_value *item = list ? list->value->items : NULL;
+    if (item && keep)
+        WEFT_TRY(weft_baked_copy(baked, &keep->base, err));
+    for (int index = 0; item; item = item->next, index++) {
+        weft_runtime_layer *const layer =
+            keep && keep->n < WEFT_RUNTIME_LAYERS_MAX ? &keep->layers[keep->n++] : NULL;
+        if (layer)
+            name_layer(item, index, layer);
+        WEFT_TRY(lay(c, item, depth, baked, layer, err));
+    }
+    return WEFT_OK;
 }
 
 static weft_err composite(const compositor *c, const weft_asset *asset, int depth, weft_baked *baked,
@@ -533,7 +599,7 @@ static weft_err composite(const compositor *c, const weft_asset *asset, int dept
             baked->maps[WEFT_BAKED_CLOTH].constant[0] = baked->type->model == WEFT_MATERIAL_CLOTH;
         }
         if (status == WEFT_OK)
-            status = lay(c, item, depth, baked, err);
+            status = lay(c, item, depth, baked, NULL, err);
     }
     const weft_asset *layered =
         NULL; /* the asset whose text has the layers: what it derives from is below them */
@@ -541,6 +607,8 @@ static weft_err composite(const compositor *c, const weft_asset *asset, int dept
         status = weft_assets_find(c->assets, layers->set_by, &layered, err);
     if (status == WEFT_OK)
         status = apply_own(c, baked, &asset->properties, layered ? layered->base : NULL, err);
+    if (status == WEFT_OK)
+        status = lay_runtime(c, asset, depth, baked, err);
     if (status != WEFT_OK)
         weft_baked_fini(baked);
     return status;
@@ -553,10 +621,10 @@ weft_err weft_composite_u3m(const weft_asset *asset, char **path, weft_error *er
     return member ? source_path(member, path, err) : WEFT_OK;
 }
 
-weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
-                        weft_baked *baked, weft_error *err)
+static weft_err run(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
+                    weft_runtime_layers *runtime, weft_baked *baked, weft_error *err)
 {
-    compositor c = {.assets = assets, .options = options, .periodic = options->periodic};
+    compositor c = {.assets = assets, .options = options, .periodic = options->periodic, .runtime = runtime};
     const weft_rad_record *const p = &asset->properties;
     c.size_mm[0] = weft_rad_number(p, "width_mm", 0);
     c.size_mm[1] = weft_rad_number(p, "height_mm", 0);
@@ -569,4 +637,24 @@ weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft
         c.width = c.height = DEFAULT_SIDE;
     }
     return composite(&c, asset, 0, baked, err);
+}
+
+weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
+                        weft_baked *baked, weft_error *err)
+{
+    return run(assets, asset, options, NULL, baked, err);
+}
+
+weft_err weft_composite_runtime(weft_assets *assets, const weft_asset *asset,
+                                const weft_composite_options *options, weft_runtime_layers *layers,
+                                weft_error *err)
+{
+    weft_baked flat;
+    *layers = (weft_runtime_layers){0};
+    const weft_err status = run(assets, asset, options, layers, &flat, err);
+    if (status == WEFT_OK)
+        weft_baked_fini(&flat);
+    else
+        weft_runtime_layers_fini(layers);
+    return status;
 }

@@ -5,6 +5,8 @@
  *     w_k = clamp(alpha_k mask_k);   P <- lerp(P, P_k, w_k) from the lowest layer up;   then the own
  * properties
  *
+ * :runtime_layers are laid over the result by the same rule: an engine may do it in their stead.
+ *
  * Every quantity is blended where it is meaningful: colours and F0 linear, roughness as alpha along and
  * across the tangent, normals as slopes (or reoriented, :blend = rnm), the rest linear; tints multiply.
  * Isotropic with anisotropic gives anisotropic; GGX with cloth keeps both lobes and the weight between them;
@@ -15,6 +17,7 @@
 
 #include "shading/bake/baked.h"
 #include "shading/material/asset.h"
+#include "shading/material/runtime_layers.h"
 
 /** What a scan gives; planes 0 where it has none.  The loader makes it, the compositor frees it. */
 typedef struct weft_scan {
@@ -48,6 +51,12 @@ typedef struct weft_composite_options {
  */
 weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,
                         weft_baked *baked, weft_error *err);
+
+/** The same, but what weft_composite() flattens at the end is kept apart.
+ *  @param layers  initialised here; n is 0 for a material without :runtime_layers */
+weft_err weft_composite_runtime(weft_assets *assets, const weft_asset *asset,
+                                const weft_composite_options *options, weft_runtime_layers *layers,
+                                weft_error *err);
 
 /** The path of the U3M that a material is made from, NULL of one that is not; free with weft_free(). */
 weft_err weft_composite_u3m(const weft_asset *asset, char **path, weft_error *err);

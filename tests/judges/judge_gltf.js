@@ -7,7 +7,7 @@ const validator = require(process.env.WEFT_JUDGES + '/node_modules/gltf-validato
     let bad = 0;
     for (const file of process.argv.slice(2)) {
         const { issues, info } = await validator.validateBytes(new Uint8Array(fs.readFileSync(file)));
-        const basisu = (info.extensionsRequired || []).includes('KHR_texture_basisu');
+        const basisu = (info?.extensionsRequired || []).includes('KHR_texture_basisu');
         const ofBasisu = ({ code, message, pointer }) => basisu &&
             ((code === 'UNSUPPORTED_EXTENSION' && message.includes("'KHR_texture_basisu'")) ||
              (code === 'VALUE_NOT_IN_LIST' && message.includes("'image/ktx2'")) ||
