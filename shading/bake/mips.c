@@ -3,6 +3,7 @@
 #include "core/mem.h"
 #include "core/parallel.h"
 #include "shading/bake/gloss.h"
+#include "shading/bake/mip_closest.h"
 #include "shading/bake/normal_filter.h"
 #include "shading/bake/vmf.h"
 
@@ -12,7 +13,7 @@
 const char weft_mip_rule_names[] = "closest|length|vmf|vmf-consistent|toksvig|none";
 
 /* A footprint beyond this is read in strides: a distribution of 4096 slopes is known well enough. */
-enum { MAX_SIDE = 64, MAX_TEXELS = MAX_SIDE * MAX_SIDE, MEDIAN_ROUNDS = 24 };
+enum { MAX_SIDE = 64, MAX_TEXELS = MAX_SIDE * MAX_SIDE };
 
 weft_mip_options weft_mip_defaults(void)
 {
@@ -85,115 +86,6 @@ static inline float slope2(const float n[3], const double mean[3])
     return (float)(s2 / (c2 * c2));
 }
 
-/* Sums go on side by side, so that the compiler may use vectors; footprints are padded to whole lanes. */
-enum { LANES = 4 };
-
-/* Sum of w (2 P(t) - 1) over a footprint, P the share of GGX slopes within t of the mean normal.
- * @param n  a multiple of LANES */
-static double balance(int n, const float *restrict d2, const float *restrict a2, const float *restrict w,
-                      double square)
-{
-    const float t2 = (float)square;
-    float sum[LANES] = {0};
-    for (int i = 0; i < n; i += LANES)
-        for (int k = 0; k < LANES; k++) {
-            const float s = t2 + d2[i + k] + a2[i + k], under = s * s - 4 * t2 * d2[i + k];
-            sum[k] += w[i + k] * (t2 - d2[i + k] - a2[i + k]) / sqrtf(under > 1e-20F ? under : 1e-20F);
-        }
-    return (double)((sum[0] + sum[1]) + (sum[2] + sum[3]));
-}
-
-/* Fills the last lanes with texels of no weight.  @return n rounded up to whole lanes */
-static int pad(int n, float *d2, float *a2, float *w)
-{
-    for (; n % LANES; n++) {
-        d2[n] = d2[n - 1];
-        a2[n] = a2[n - 1];
-        w[n] = 0;
-    }
-    return n;
-}
-
-/* The square of the median slope: the root of the balance by false position within a bracket (Illinois). */
-static double median2(int n, const float *d2, const float *a2, const float *w)
-{
-    double x0 = 1e9, x1 = 0;
-    for (int i = 0; i < n; i++) {
-        x0 = fmin(x0, (double)a2[i]);
-        x1 = fmax(x1, (double)(d2[i] + a2[i]));
-    }
-    if (x1 - x0 < 1e-5 * x1)
-        return x1;
-    double f0 = balance(n, d2, a2, w, x0), f1 = balance(n, d2, a2, w, x1);
-    if (f0 >= 0 || f1 <= 0) /* rounding */
-        return f0 >= 0 ? x0 : x1;
-    for (int round = 0; round < MEDIAN_ROUNDS && x1 - x0 > 1e-4 * x1; round++) {
-        const double x = x0 - f0 * (x1 - x0) / (f1 - f0), f = balance(n, d2, a2, w, x);
-        if (fabs(f) < 1e-4 * f1)
-            return x;
-        if (f < 0) {
-            x0 = x;
-            f0 = f;
-            f1 *= 0.5;
-        } else {
-            x1 = x;
-            f1 = f;
-            f0 *= 0.5;
-        }
-    }
-    return 0.5 * (x0 + x1);
-}
-
-/* Slopes at which the two distributions are held against each other, as factors of the median squared: where
- * a GGX has 5, 15, 30, 50, 70, 85 and 95 per cent. */
-static const double probes[] = {0.0526, 0.1765, 0.4286, 1, 2.3333, 5.6667, 19};
-
-enum { PROBES = sizeof probes / sizeof probes[0], CLOSEST_ROUNDS = 24 };
-
-/* By how much more the model lies above the footprint somewhere than below it elsewhere; falls with alpha2,
- * as each share of the model does. */
-static double excess(const double *squares, const double *shares, double alpha2)
-{
-    double above = -1, below = -1;
-    for (int k = 0; k < PROBES; k++) {
-        const double off = squares[k] / (squares[k] + alpha2) - shares[k];
-        above = off > above ? off : above;
-        below = -off > below ? -off : below;
-    }
-    return above - below;
-}
-
-/* alpha of the GGX that is nowhere far from the footprint: where it is as far above as below (Illinois, about
- * the median). */
-static double closest(int n, const float *d2, const float *a2, const float *w)
-{
-    double squares[PROBES], shares[PROBES], weight = 0;
-    const double middle = median2(n, d2, a2, w);
-    for (int i = 0; i < n; i++)
-        weight += (double)w[i];
-    for (int k = 0; k < PROBES; k++) {
-        squares[k] = probes[k] * middle;
-        shares[k] = 0.5 + 0.5 * balance(n, d2, a2, w, squares[k]) / weight;
-    }
-    double x0 = middle / 7.4, x1 = middle * 7.4;
-    double f0 = excess(squares, shares, x0), f1 = excess(squares, shares, x1);
-    for (int round = 0; round < CLOSEST_ROUNDS && x1 - x0 > 4e-4 * x0 && f0 > 0 && f1 < 0; round++) {
-        const double x = x0 - f0 * (x1 - x0) / (f1 - f0), f = excess(squares, shares, x);
-        if (fabs(f) < 1e-5)
-            return sqrt(x);
-        if (f > 0) {
-            x0 = x;
-            f0 = f;
-            f1 *= 0.5;
-        } else {
-            x1 = x;
-            f1 = f;
-            f0 *= 0.5;
-        }
-    }
-    return sqrt(f0 <= 0 ? x0 : f1 >= 0 ? x1 : 0.5 * (x0 + x1));
-}
-
 double weft_mip_roughness(weft_mip_rule rule, int n, const float (*normals)[3], const float *weights,
                           const float *alphas)
 {
@@ -216,7 +108,7 @@ double weft_mip_roughness(weft_mip_rule rule, int n, const float (*normals)[3], 
         a2[i] = alphas[from] * alphas[from];
         w[i] = weights[from];
     }
-    return fmin(closest(pad(kept, d2, a2, w), d2, a2, w), 1);
+    return fmin(weft_mip_closest(kept, d2, a2, w), 1);
 }
 
 /* -- levels of normals and roughness ------------------------------------------------------------------ */
@@ -278,7 +170,7 @@ static double closest_of(const level_job *job, const extent *ex, const extent *e
             a2[n] = (float)(alpha * alpha * (1 - anisotropy_at(job->baked, x, y)));
             w[n] = (float)(share(ex, x) * share(ey, y));
         }
-    return closest(pad(n, d2, a2, w), d2, a2, w);
+    return weft_mip_closest(n, d2, a2, w);
 }
 
 static void sum_footprint(const level_job *job, const extent *ex, const extent *ey, footprint *f)
