@@ -48,8 +48,8 @@ static void find_footprints(const weft_preview_setup *setup, const weft_preview_
         const float u = (float)s->u[i] - u0, v = (float)s->v[i] - v0;
         const float nx = s->axis[2][0][i], ny = s->axis[2][1][i], sine2 = nx * nx + ny * ny;
         const float theta = sqrtf(u * u + v * v) / radius;
-        const float wide = sphere > 0 ? theta / sqrtf(weft_max(sine2, 1e-6F)) : 1;
-        const float round = sine2 > 1e-6F ? wide : 1;
+        const float wide = theta / sqrtf(weft_max(sine2, 1e-6F)) - 1;
+        const float round = 1 + sphere * (sine2 > 1e-6F ? wide : 0);
         float a[2], b[2];
         step_over_map(s, i, 0, round, a);
         step_over_map(s, i, 1, round, b);
@@ -59,10 +59,10 @@ static void find_footprints(const weft_preview_setup *setup, const weft_preview_
         const float root = sqrtf(half * half + ab * ab);
         const float major = scale * sqrtf(mean + root), minor = scale * sqrtf(weft_max(mean - root, 1e-12F));
         const float x = half > 0 ? half + root : ab, y = half > 0 ? ab : root - half;
-        const float length2 = x * x + y * y, inverse = length2 > 1e-20F ? major / sqrtf(length2) : 0;
-        const float wanted = ceilf(major / minor - 1e-3F);
-        const float taps = most > 1 ? (wanted < most ? weft_max(wanted, 1) : most) : 1;
-        const float width = most > 1 ? weft_max(minor, major / taps) : major;
+        const float length2 = x * x + y * y, inverse = major / sqrtf(weft_max(length2, 1e-20F));
+        const float wanted = weft_max(ceilf(major / minor - 1e-3F), 1);
+        const float taps = wanted < most ? wanted : most, share = major / taps;
+        const float width = weft_max(minor, share);
         f->along[0][i] = x * inverse;
         f->along[1][i] = y * inverse;
         f->taps[i] = taps;
@@ -135,28 +135,33 @@ static void place_taps(const weft_preview_setup *setup, const weft_preview_sampl
     }
 }
 
+/* Eight channels at once: gcc makes no vector code of the plain loop that widens 16 bits to floats (1.9 times
+ * the time of the whole look-up). */
+typedef int16_t packed8 __attribute__((vector_size(16)));
+typedef int32_t wide8 __attribute__((vector_size(32)));
+typedef float float8 __attribute__((vector_size(32)));
+
 /* Adds eight channels of the texels to sums [n][8]. */
 WEFT_CLONES
 static void gather(const weft_preview_texture *t, const lookup *l, int n, int channel, float (*sums)[8])
 {
     const int more = t->levels - 1 > t->first, stride = t->stride;
+    const bool turns = channel == 0 && t->plane[0] == -1;
     for (int i = 0; i < n; i++) {
-        float sum[8] = {0};
+        float8 sum, texel_sum = {0};
         for (int which = 0; which < 2; which++) {
             const int16_t *const level = t->level[l->level[i] + which * more] + channel;
             for (int k = 0; k < 4; k++) {
-                const int16_t *const texel = level + (size_t)l->at[which][k][i] * (size_t)stride;
-                const float share = l->share[which][k][i];
-                for (int c = 0; c < 8; c++)
-                    sum[c] += share * (float)texel[c];
+                packed8 texel;
+                memcpy(&texel, level + (size_t)l->at[which][k][i] * (size_t)stride, sizeof texel);
+                const wide8 wide = __builtin_convertvector(texel, wide8);
+                texel_sum += l->share[which][k][i] * __builtin_convertvector(wide, float8);
             }
         }
-        if (channel == 0 && t->plane[0] == -1) {
-            sum[0] *= l->sign[0][i];
-            sum[1] *= l->sign[1][i];
-        }
-        for (int c = 0; c < 8; c++)
-            sums[i][c] += sum[c];
+        const float8 sign = {turns ? l->sign[0][i] : 1, turns ? l->sign[1][i] : 1, 1, 1, 1, 1, 1, 1};
+        memcpy(&sum, sums[i], sizeof sum);
+        sum += sign * texel_sum;
+        memcpy(sums[i], &sum, sizeof sum);
     }
 }
 
