@@ -3,7 +3,10 @@
  * chains of mips, anisotropic look-ups) under one ball light and a clear sky.
  *
  * Baseline: the same picture with a distant light alone.  Goal: 10 frames a second on two cores.
+ *
+ *     bench_preview [PICTURE.png]      keeps the first picture (tests/bench/peers/preview_three.sh)
  */
+#include "core/formats/image_file.h"
 #include "core/mem.h"
 #include "core/parallel.h"
 #include "core/progress.h"
@@ -14,20 +17,21 @@
 #include <stdio.h>
 #include <time.h>
 
-enum { SIDE = 4096, WIDTH = 1920, HEIGHT = 1080, ROUNDS = 7 };
+enum { SIDE = 4096, WIDTH = 1920, HEIGHT = 1080, SHOWN = SIDE * HEIGHT / WIDTH, ROUNDS = 7 };
 
 static void weave(weft_baked *baked)
 {
     weft_image *const normal = &baked->maps[WEFT_BAKED_NORMAL].mips[0];
     weft_image *const albedo = &baked->maps[WEFT_BAKED_ALBEDO].mips[0];
     weft_image *const alpha = &baked->maps[WEFT_BAKED_ROUGHNESS].mips[0];
+    static const float yarns[2][3] = {{0.05F, 0.1F, 0.3F}, {0.6F, 0.5F, 0.3F}};
     for (int y = 0; y < SIDE; y++)
         for (int x = 0; x < SIDE; x++) {
             const double a = 0.4 * sin(0.2 * x), b = 0.4 * sin(0.2 * y), z = 1 / sqrt(1 + a * a + b * b);
             const double n[3] = {-a * z, -b * z, z};
             for (int c = 0; c < 3; c++) {
                 weft_image_row(normal, c, y)[x] = (float)n[c];
-                weft_image_row(albedo, c, y)[x] = (x + y) & 64 ? 0.5f : 0.1f;
+                weft_image_row(albedo, c, y)[x] = yarns[(x + y) & 64 ? 1 : 0][c];
             }
             weft_image_row(alpha, 0, y)[x] = 0.3f;
         }
@@ -62,8 +66,17 @@ static const struct {
                 {"plane, four samples", WEFT_PREVIEW_PLANE, false},
                 {"ball, one sample a pixel", WEFT_PREVIEW_SPHERE, true}};
 
+static weft_err keep(const weft_preview_surface *surface, const weft_preview_view *view, const char *path)
+{
+    weft_image picture;
+    WEFT_TRY(weft_preview_render(surface, view, &picture, NULL));
+    const weft_err status = weft_image_write(path, &picture, 8, WEFT_TRANSFER_SRGB, NULL);
+    weft_image_fini(&picture);
+    return status;
+}
+
 static weft_err run(weft_preview_surface *surface, const weft_environment_map *map,
-                    const weft_environment_table *table)
+                    const weft_environment_table *table, const char *path)
 {
     for (size_t k = 0; k < sizeof pictures / sizeof pictures[0]; k++) {
         weft_preview_view view = weft_preview_view_defaults();
@@ -72,8 +85,9 @@ static weft_err run(weft_preview_surface *surface, const weft_environment_map *m
         view.height = HEIGHT;
         view.shape = pictures[k].shape;
         view.draft = pictures[k].draft;
+        view.exposure_ev = -1;
         if (view.shape == WEFT_PREVIEW_PLANE)
-            view.crop = (weft_preview_crop){0, 0, SIDE, SIDE * HEIGHT / WIDTH};
+            view.crop = (weft_preview_crop){0, (SIDE - SHOWN) / 2, SIDE, SHOWN};
         const double begin = weft_clock_s();
         WEFT_TRY(weft_preview_pack(surface, &view, &texture, NULL));
         const double packed = weft_clock_s() - begin;
@@ -89,6 +103,8 @@ static weft_err run(weft_preview_surface *surface, const weft_environment_map *m
                "%.1f times a distant light alone (%.2f frames/s); packed once in %.2f s\n",
                pictures[k].name, 1 / full.wall_s, full.cpu_s, 2 / full.cpu_s, full.cpu_s / plain.cpu_s,
                1 / plain.wall_s, packed);
+        if (k == 0 && path)
+            WEFT_TRY(keep(surface, &view, path));
         surface->texture = NULL;
         weft_preview_texture_fini(&texture);
     }
@@ -104,7 +120,7 @@ static void use_map(weft_preview_surface *surface, const char *param, const weft
         surface->maps[plane + c] = (weft_preview_map){map->mips, c, map->n_mips};
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     static weft_environment_table table;
     weft_baked baked = {0};
@@ -134,7 +150,7 @@ int main(void)
     weft_brdf_defaults(surface.brdf, surface.params);
     use_map(&surface, "albedo", &baked.maps[WEFT_BAKED_ALBEDO]);
     use_map(&surface, "alpha", &baked.maps[WEFT_BAKED_ROUGHNESS]);
-    status = run(&surface, &map, &table);
+    status = run(&surface, &map, &table, argc > 1 ? argv[1] : NULL);
     weft_environment_map_fini(&map);
     weft_image_fini(&panorama);
     weft_baked_fini(&baked);

@@ -2,10 +2,7 @@
 // Chromium: straight on, one distant light, no other; a white card that faces the light is just white.
 // Exits 77 when Chromium cannot draw here.
 import fs from 'fs';
-import http from 'http';
-import os from 'os';
-import path from 'path';
-import { spawn } from 'child_process';
+import { showPage } from './chromium_page.mjs';
 const three = process.env.WEFT_JUDGES + '/node_modules/three/';
 const [file, out, width, height, azimuth = '135', elevation = '45', zoom = '1'] = process.argv.slice(2);
 
@@ -37,39 +34,7 @@ await say('about', JSON.stringify({ size_mm: [size.x * 1000, size.y * 1000], mat
 await say('picture', renderer.domElement.toDataURL('image/png'));
 </script>`;
 
-const kinds = { '.js': 'text/javascript', '.wasm': 'application/wasm' };
-const server = http.createServer((request, response) => {
-    const url = request.url.split('?')[0];
-    if (request.method === 'POST') {
-        const parts = [];
-        request.on('data', part => parts.push(part)).on('end', () => { response.end(); take(url, Buffer.concat(parts).toString()); });
-        return;
-    }
-    const wanted = url === '/swatch.glb' ? file : url.startsWith('/three/') ? path.join(three, path.normalize(url.slice(7))) : null;
-    if (url === '/') { response.setHeader('content-type', 'text/html'); response.end(page); return; }
-    if (!wanted || !fs.existsSync(wanted)) { response.statusCode = 404; response.end(); return; }
-    response.setHeader('content-type', kinds[path.extname(wanted)] || 'application/octet-stream');
-    fs.createReadStream(wanted).pipe(response);
-});
-
-const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'weft-chromium-'));
-let browser, words = '';
-function finish(status, text) {
-    if (text) console.log(text);
-    browser.removeAllListeners('exit');
-    browser.once('exit', () => { fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 }); process.exit(status); });
-    try { process.kill(-browser.pid, 'SIGKILL'); } catch { process.exit(status); }
-}
-function take(url, body) {
-    if (url === '/about') console.log(body);
-    if (url === '/failed') finish(/WebGL/.test(body) ? 77 : 1, 'the page failed: ' + body);
-    if (url === '/picture') { fs.writeFileSync(out, Buffer.from(body.split(',')[1], 'base64')); finish(0); }
-}
-server.listen(0, '127.0.0.1', () => {
-    browser = spawn('chromium', ['--headless=new', '--no-sandbox', '--no-first-run', '--disable-extensions', '--disable-background-networking',
-        '--disable-sync', '--disable-dev-shm-usage', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-        '--user-data-dir=' + profile, `http://127.0.0.1:${server.address().port}/`], { detached: true, stdio: ['ignore', 'ignore', 'pipe'] });
-    browser.stderr.on('data', d => { words = (words + d).slice(-2000); });
-    browser.on('exit', code => { console.log('chromium ended with ' + code + '\n' + words); process.exit(77); });
-    setTimeout(() => finish(77, 'chromium did not draw within 4 minutes\n' + words), 240000);
+showPage(page, { three, files: { '/swatch.glb': file } }, (what, body, finish) => {
+    if (what === 'about') console.log(body);
+    if (what === 'picture') { fs.writeFileSync(out, Buffer.from(body.split(',')[1], 'base64')); finish(0); }
 });
