@@ -1,12 +1,11 @@
 #include "host/solve/alpha.h"
 
 #include "core/colour.h"
-#include "core/mem.h"
 #include "host/solve/finish.h"
+#include "host/solve/flaw_search.h"
 #include "host/solve/running_mean.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The ground is where a pixel is nearer than this part of the way to the darkest yarns; its neighbours within
@@ -22,15 +21,11 @@ typedef struct alpha_job {
     int reach;
     weft_image luminance; /* 1 plane */
     weft_image yarn;      /* 2 planes: luminance of closed pixels, and their number; means of both */
+    weft_mask closed;     /* surely yarn, and nothing else */
     weft_mask edge;       /* 1 at holes and within EDGE_PX of them */
     double mean;          /* of all closed pixels */
     float dark;           /* the darkest of them */
 } alpha_job;
-
-static bool answered(const weft_maps *maps, size_t i)
-{
-    return !maps->mask.data || maps->mask.data[i];
-}
 
 static void fill_luminance(alpha_job *job)
 {
@@ -47,10 +42,12 @@ static float sure_of(const alpha_job *job)
     return (float)brighter * job->ground + 0.01F;
 }
 
-/* Surely yarn, and nothing else. */
-static bool is_closed(const alpha_job *job, size_t i)
+static void find_closed(alpha_job *job)
 {
-    return answered(job->maps, i) && !job->edge.data[i] && job->luminance.data[i] > sure_of(job);
+    const size_t n = weft_image_plane_size(&job->luminance);
+    for (size_t i = 0; i < n; i++)
+        job->closed.data[i] =
+            weft_flaw_answered(job->maps, i) && !job->edge.data[i] && job->luminance.data[i] > sure_of(job);
 }
 
 /* Mean luminance of the closed pixels around each. */
@@ -59,8 +56,9 @@ static weft_err find_yarn(alpha_job *job, weft_error *err)
     const size_t n = weft_image_plane_size(&job->luminance);
     float *const sum = weft_image_plane(&job->yarn, 0), *const count = weft_image_plane(&job->yarn, 1);
     double total = 0, closed = 0;
+    find_closed(job);
     for (size_t i = 0; i < n; i++) {
-        const bool use = is_closed(job, i);
+        const bool use = job->closed.data[i];
         sum[i] = use ? job->luminance.data[i] : 0;
         count[i] = use ? 1 : 0;
         total += (double)sum[i];
@@ -81,29 +79,6 @@ static float coverage(const alpha_job *job, size_t i)
     return fminf(fmaxf((job->luminance.data[i] - job->ground) / (yarn - job->ground), 0), 1);
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-/* Luminance that a twentieth of the closed pixels stay below; of one pixel in 7, which is plenty. */
-static weft_err find_dark_yarns(alpha_job *job, weft_error *err)
-{
-    const size_t n = weft_image_plane_size(&job->luminance);
-    float *const some = weft_alloc(n / 7 + 1, sizeof *some, err);
-    size_t count = 0;
-    if (!some)
-        return WEFT_ERR_NOMEM;
-    for (size_t i = 0; i < n; i += 7)
-        if (is_closed(job, i))
-            some[count++] = job->luminance.data[i];
-    qsort(some, count, sizeof *some, compare_floats);
-    job->dark = count ? some[(size_t)(dark_yarns * (double)count)] : 1;
-    weft_free(some);
-    return WEFT_OK;
-}
-
 /* Pixels darker than `most`, and their neighbours. */
 static void mark_edges(alpha_job *job, float most)
 {
@@ -112,7 +87,7 @@ static void mark_edges(alpha_job *job, float most)
     for (int v = 0; v < h; v++)
         for (int u = 0; u < w; u++) {
             const size_t i = (size_t)v * (size_t)w + (size_t)u;
-            if (!answered(job->maps, i) || !(job->luminance.data[i] < most))
+            if (!weft_flaw_answered(job->maps, i) || !(job->luminance.data[i] < most))
                 continue;
             for (int y = v - EDGE_PX < 0 ? 0 : v - EDGE_PX; y <= v + EDGE_PX && y < h; y++)
                 for (int x = u - EDGE_PX < 0 ? 0 : u - EDGE_PX; x <= u + EDGE_PX && x < w; x++)
@@ -125,6 +100,7 @@ static weft_err make_job(alpha_job *job, weft_error *err)
     const weft_maps *const m = job->maps;
     WEFT_TRY(weft_image_init(&job->luminance, m->width, m->height, 1, err));
     WEFT_TRY(weft_image_init(&job->yarn, m->width, m->height, 2, err));
+    WEFT_TRY(weft_mask_init(&job->closed, m->width, m->height, 0, err));
     return weft_mask_init(&job->edge, m->width, m->height, 0, err);
 }
 
@@ -138,7 +114,8 @@ weft_err weft_maps_find_alpha(weft_maps *maps, double ground, weft_error *err)
     if (status == WEFT_OK) {
         fill_luminance(&job);
         mark_edges(&job, sure_of(&job));
-        status = find_dark_yarns(&job, err);
+        find_closed(&job);
+        status = weft_flaw_quantile(&job.luminance, &job.closed, dark_yarns, &job.dark, err);
     }
     if (status == WEFT_OK) {
         mark_edges(&job, job.ground + (float)way_to_dark * (job.dark - job.ground));
@@ -149,12 +126,13 @@ weft_err weft_maps_find_alpha(weft_maps *maps, double ground, weft_error *err)
     if (status == WEFT_OK) {
         const size_t n = weft_image_plane_size(&alpha);
         for (size_t i = 0; i < n; i++)
-            alpha.data[i] = !answered(maps, i) ? 0 : job.edge.data[i] ? coverage(&job, i) : 1;
+            alpha.data[i] = !weft_flaw_answered(maps, i) ? 0 : job.edge.data[i] ? coverage(&job, i) : 1;
         weft_image_fini(&maps->alpha);
         maps->alpha = alpha;
     }
     weft_image_fini(&job.luminance);
     weft_image_fini(&job.yarn);
+    weft_mask_fini(&job.closed);
     weft_mask_fini(&job.edge);
     return status;
 }

@@ -1,0 +1,103 @@
+/* Lint: what is darker or brighter than the cloth and too thin for a yarn. */
+#include "host/solve/flaw_search.h"
+#include "host/solve/running_mean.h"
+
+#include <math.h>
+
+/* Thinner than this is lint, thicker a yarn. */
+static const double lint_mm = 0.5;
+/* Least contrast, relative to the cloth around, and in units of what the cloth itself has. */
+static const float lint_contrast = 0.12F, lint_usual = 3;
+
+/* Least (sign 1) or greatest (-1) value within `reach` along a line of n pixels that are `step` apart. */
+static void reach_line(const float *from, int n, size_t step, int reach, float sign, float *to)
+{
+    for (int i = 0; i < n; i++) {
+        float least = INFINITY;
+        for (int k = i - reach < 0 ? 0 : i - reach; k <= i + reach && k < n; k++)
+            least = fminf(least, sign * from[(size_t)k * step]);
+        to[(size_t)i * step] = sign * least;
+    }
+}
+
+static void reach_square(const weft_image *from, int reach, float sign, weft_image *between, weft_image *to)
+{
+    for (int v = 0; v < from->height; v++)
+        reach_line(weft_image_row(from, 0, v), from->width, 1, reach, sign, weft_image_row(between, 0, v));
+    for (int u = 0; u < from->width; u++)
+        reach_line(between->data + u, from->height, (size_t)from->width, reach, sign, to->data + u);
+}
+
+/* One colour, and how much of the surroundings is cloth. */
+static void fill_colour(const weft_flaw_search *s, int c, weft_image *colour, weft_image *around)
+{
+    const size_t n = weft_image_plane_size(colour);
+    const float *const from = weft_image_plane(&s->maps->albedo, c);
+    for (size_t i = 0; i < n; i++) {
+        const bool use = s->cloth->data[i];
+        colour->data[i] = around->data[i] = use ? from[i] : 0;
+        around->data[n + i] = use ? 1 : 0;
+    }
+}
+
+typedef struct lint_images {
+    weft_image colour, around, between, opened;
+} lint_images;
+
+static weft_err make_lint_images(lint_images *to, int width, int height, weft_error *err)
+{
+    WEFT_TRY(weft_image_init(&to->colour, width, height, 1, err));
+    WEFT_TRY(weft_image_init(&to->around, width, height, 2, err));
+    WEFT_TRY(weft_image_init(&to->between, width, height, 1, err));
+    return weft_image_init(&to->opened, width, height, 1, err);
+}
+
+/* Brighter than what a square of lint_mm fits into (sign 1: opening), or darker (-1: closing), relative to
+ * the mean around; of the three colours the most. */
+static weft_err find_contrast(const weft_flaw_search *s, float sign, lint_images *im, weft_image *contrast,
+                              weft_error *err)
+{
+    const int reach = (int)fmax(2, round(lint_mm / 2 / s->maps->mm_per_px));
+    const size_t n = weft_image_plane_size(contrast);
+    for (int c = 0; c < 3; c++) {
+        fill_colour(s, c, &im->colour, &im->around);
+        WEFT_TRY(weft_running_mean(&im->around, 4 * reach, 1, err));
+        reach_square(&im->colour, reach, sign, &im->between, &im->opened);
+        reach_square(&im->opened, reach, -sign, &im->between, &im->opened);
+        for (size_t i = 0; i < n; i++) {
+            const float weight = im->around.data[n + i];
+            if (!s->cloth->data[i] || weight < 0.9F)
+                continue;
+            const float mean = fmaxf(im->around.data[i] / weight, 0.02F);
+            contrast->data[i] =
+                fmaxf(contrast->data[i], sign * (im->colour.data[i] - im->opened.data[i]) / mean);
+        }
+    }
+    return WEFT_OK;
+}
+
+weft_err weft_flaw_find_lint(weft_flaw_search *s, float sign, weft_error *err)
+{
+    lint_images images = {0};
+    weft_image contrast;
+    float usual = 0;
+    WEFT_TRY(weft_image_init(&contrast, s->maps->width, s->maps->height, 1, err));
+    weft_err status = make_lint_images(&images, s->maps->width, s->maps->height, err);
+    if (status == WEFT_OK)
+        status = find_contrast(s, sign, &images, &contrast, err);
+    weft_image_fini(&images.colour);
+    weft_image_fini(&images.around);
+    weft_image_fini(&images.between);
+    weft_image_fini(&images.opened);
+    if (status == WEFT_OK)
+        status = weft_flaw_quantile(&contrast, s->cloth, 0.98, &usual, err);
+    if (status == WEFT_OK) {
+        const float strong = fmaxf(lint_contrast, lint_usual * usual);
+        weft_flaw_mark(&contrast, strong, strong / 2, &s->marks);
+        s->least_mm = 2;
+        s->widest_mm = lint_mm;
+        status = weft_components_keep(&s->marks, weft_flaw_keep, s, err);
+    }
+    weft_image_fini(&contrast);
+    return status;
+}
