@@ -1,11 +1,13 @@
 #include "host/capture/capture.h"
 
 #include "core/file.h"
+#include "core/formats/raw_file.h"
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/sha256.h"
 #include "host/capture/average.h"
 #include "host/capture/exposures.h"
+#include "host/capture/light_print.h"
 #include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
 #include "host/capture/shoot.h"
@@ -24,6 +26,11 @@
 #define BRIGHTER_OFFSET 0.0005
 /* Clipped photosites of one colour that are worth a warning. */
 #define CLIPPED_SHARE 0.001
+/* Frames of one light have one shape to a few thousandths (noise; a lamp that warms up moves nothing); those
+ * of two lamps of a dome differ by some hundredths at least.  Short exposures of a bracket have more noise.
+ */
+#define SAME_SHAPE  0.005
+#define OTHER_SHAPE 0.03
 /* A room this bright costs range and adds its own noise. */
 #define BRIGHT_ROOM 0.05
 /* A DNG is its samples and some tags. */
@@ -39,6 +46,8 @@ typedef struct capture_run {
     weft_progress *progress;
     bool has_dark_mean;
     double dark_mean; /* mean of a frame without lights, share of the range per second and gain */
+    weft_light_print dark_print;
+    weft_light_print prints[WEFT_CAPTURE_MAX_LIGHTS]; /* of the middle exposures that there are */
 } capture_run;
 
 static weft_err complete_options(capture_run *run, const weft_controller_info *info, weft_error *err)
@@ -170,6 +179,36 @@ static void check_brightness(const capture_run *run, const weft_planned_frame *f
                  without > BRIGHT_ROOM ? "does this lamp shine all the time?" : "is the lamp connected?");
 }
 
+static weft_light_print print_of_frame(const capture_run *run)
+{
+    const weft_captured_frame *const f = &run->shooter.frame;
+    return weft_light_print_make(&f->mosaic, f->exposure_s * f->gain);
+}
+
+/* The controller answers for its outputs; the picture for the lamps behind them. */
+static void check_shape(const capture_run *run, const weft_planned_frame *frame, weft_shot *shot)
+{
+    if (frame->role != WEFT_ROLE_LIGHT)
+        return;
+    const weft_light_print now = print_of_frame(run);
+    for (int light = 0; light < WEFT_CAPTURE_MAX_LIGHTS && !shot->reason[0]; light++) {
+        const double d = weft_light_print_difference(&now, &run->prints[light], &run->dark_print);
+        if (d < 0)
+            continue;
+        if (light == frame->light && !frame->middle && d > OTHER_SHAPE)
+            snprintf(
+                shot->reason, sizeof shot->reason,
+                "another picture than its exposure of %g s (they differ by %.1f %%): was another lamp on, or "
+                "did the sample move?",
+                run->prints[light].time / run->shooter.frame.gain, 100 * d);
+        else if (light != frame->light && frame->middle && d < SAME_SHAPE)
+            snprintf(
+                shot->reason, sizeof shot->reason,
+                "the same picture as under light %d (they differ by %.2f %%): does its wire go to that lamp?",
+                light, 100 * d);
+    }
+}
+
 /* A cable that was pulled out may be put in again.  Meanwhile the controller goes dark by itself, and what
  * was being exposed is void.  Any other failure stays one. */
 static weft_err come_back(capture_run *run, weft_err status, weft_error *why, weft_error *err)
@@ -210,6 +249,8 @@ static weft_err shoot_until_good(capture_run *run, const weft_planned_frame *fra
         if (!shot->reason[0])
             check_brightness(run, frame, shot);
         if (!shot->reason[0])
+            check_shape(run, frame, shot);
+        if (!shot->reason[0])
             return WEFT_OK;
         if (try >= run->o.tries)
             return weft_fail(err, WEFT_ERR_DEVICE, "%s: %s (tried %d times)", what, shot->reason, try);
@@ -247,6 +288,7 @@ static void remember_dark_mean(capture_run *run, const weft_shot *shot)
     const weft_captured_frame *const f = &run->shooter.frame;
     run->dark_mean = fmax(shot->stats.mean, 0) / (f->exposure_s * f->gain);
     run->has_dark_mean = true;
+    run->dark_print = print_of_frame(run);
     if (shot->stats.mean > BRIGHT_ROOM) {
         weft_warn("the room is bright: %.0f %% of the range with all lights off; darken it",
                   100 * shot->stats.mean);
@@ -433,14 +475,35 @@ static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_err
     WEFT_TRY(status);
     if (frame->role == WEFT_ROLE_AMBIENT)
         remember_dark_mean(run, &shot);
+    if (frame->role == WEFT_ROLE_LIGHT && frame->middle)
+        run->prints[frame->light] = print_of_frame(run);
     warn_of_clipping(run, frame, &shot);
     frame->have = true;
     run->report.n_taken++;
     return WEFT_OK;
 }
 
+/* Of frames from before: a set that is resumed is judged as one that is taken in one go. */
+static weft_err read_prints(capture_run *run, weft_error *err)
+{
+    for (int i = 0; i < run->plan.n; i++) {
+        const weft_planned_frame *const f = &run->plan.frames[i];
+        if (!f->have || f->role != WEFT_ROLE_LIGHT || !f->middle)
+            continue;
+        weft_mosaic mosaic;
+        char *const path = weft_set_frame_path(&run->set, f->row, err);
+        const weft_err status = path ? weft_raw_read(path, &mosaic, NULL, err) : WEFT_ERR_NOMEM;
+        weft_free(path);
+        WEFT_TRY(status);
+        run->prints[f->light] = weft_light_print_make(&mosaic, weft_set_frame_time(&run->set.frames[f->row]));
+        weft_mosaic_fini(&mosaic);
+    }
+    return WEFT_OK;
+}
+
 static weft_err take_frames(capture_run *run, weft_error *err)
 {
+    WEFT_TRY(read_prints(run, err));
     if (run->o.no_ambient || run->plan.frames[0].have)
         WEFT_TRY(look_at_the_dark(run, err));
     for (int i = 0; i < run->plan.n; i++) {

@@ -91,19 +91,21 @@ void weft_controller_sim_set_line_faults(weft_controller_sim *sim, weft_sim_dire
                                          const weft_sim_line_faults *faults);
 
 /** A lamp that is not as the board wants it: its transistor conducts always, or never; its LED is open, so
- *  that it draws no current; or its driver takes its time to light it. */
+ *  that it draws no current; its driver takes its time to light it; or its wire goes to another lamp. */
 typedef enum weft_sim_lamp_state {
     WEFT_SIM_LAMP_GOOD,
     WEFT_SIM_LAMP_ON,
     WEFT_SIM_LAMP_OFF,
     WEFT_SIM_LAMP_OPEN,
     WEFT_SIM_LAMP_LATE,
+    WEFT_SIM_LAMP_AS,
 } weft_sim_lamp_state;
 
-/** @param lamp     0 .. WEFT_SIM_N_LIGHTS - 1
- *  @param late_us  of WEFT_SIM_LAMP_LATE alone */
+/** @param lamp    0 .. WEFT_SIM_N_LIGHTS - 1
+ *  @param number  of WEFT_SIM_LAMP_LATE: microseconds; of WEFT_SIM_LAMP_AS: the lamp that shines in its stead
+ */
 void weft_controller_sim_set_lamp(weft_controller_sim *sim, int lamp, weft_sim_lamp_state state,
-                                  uint32_t late_us);
+                                  uint32_t number);
 
 /** Lamps that the board has on: those of weft_controller_sim_lights() and the ones that are broken. */
 uint32_t weft_controller_sim_driven(weft_controller_sim *sim);

@@ -98,20 +98,23 @@ static uint32_t drive_lamps(weft_controller_sim *sim, uint32_t wanted)
             if (lamp->state == WEFT_SIM_LAMP_LATE)
                 avr_cycle_timer_register(sim->avr, lamp->late, light_up, lamp);
         }
-        lights |= (uint32_t)gives_light(sim, i) << i;
+        lights |= (uint32_t)gives_light(sim, i) << (lamp->state == WEFT_SIM_LAMP_AS ? lamp->other : i);
     }
     return lights;
 }
 
 void weft_controller_sim_set_lamp(weft_controller_sim *sim, int lamp, weft_sim_lamp_state state,
-                                  uint32_t late_us)
+                                  uint32_t number)
 {
+    const bool late = state == WEFT_SIM_LAMP_LATE;
     pthread_mutex_lock(&sim->mutex);
     count_light_until(sim, sim->avr->cycle);
-    sim->lamps[lamp] = (weft_sim_lamp_fault){.state = state,
-                                             .late = 1 + (avr_cycle_count_t)late_us * WEFT_SIM_CYCLES_A_US,
-                                             .driven_since = sim->avr->cycle,
-                                             .sim = sim};
+    sim->lamps[lamp] =
+        (weft_sim_lamp_fault){.state = state,
+                              .late = 1 + (avr_cycle_count_t)(late ? number : 0) * WEFT_SIM_CYCLES_A_US,
+                              .other = late ? 0 : (int)number,
+                              .driven_since = sim->avr->cycle,
+                              .sim = sim};
     weft_sim_look_at_pins(sim);
     pthread_mutex_unlock(&sim->mutex);
 }

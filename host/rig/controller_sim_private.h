@@ -39,6 +39,7 @@ typedef struct weft_sim_line {
 /* A lamp and what is wrong with it. */
 typedef struct weft_sim_lamp_fault {
     weft_sim_lamp_state state;
+    int other;                      /* of WEFT_SIM_LAMP_AS */
     avr_cycle_count_t late;         /* light comes so long after current */
     avr_cycle_count_t driven_since; /* while it is driven */
     weft_controller_sim *sim;

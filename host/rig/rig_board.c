@@ -88,21 +88,22 @@ static json_t *plug(weft_rig_board *board, bool *moved)
     return json_pack("{s:b, s:s, s:s}", "ok", 1, "pty", board->pty, "port", board->link);
 }
 
-/* lamp N good|on|off|open, lamp N late US */
+/* lamp N good|on|off|open, lamp N late US, lamp N as M */
 static json_t *break_lamp(weft_rig_board *board, char **words, int n)
 {
-    static const char *const states[] = {"good", "on", "off", "open", "late"};
-    int lamp = -1, us = 0;
+    static const char *const states[] = {"good", "on", "off", "open", "late", "as"};
+    int lamp = -1, number = 0;
     if (n >= 2 && weft_text_to_int(words[0], &lamp) && lamp >= 0 && lamp < WEFT_SIM_N_LIGHTS)
-        for (int state = WEFT_SIM_LAMP_GOOD; state <= WEFT_SIM_LAMP_LATE; state++) {
-            const bool late = state == WEFT_SIM_LAMP_LATE;
-            if (strcmp(words[1], states[state]) != 0 || n != (late ? 3 : 2) ||
-                (late && !(weft_text_to_int(words[2], &us) && us >= 0 && us <= 1000000)))
+        for (int state = WEFT_SIM_LAMP_GOOD; state <= WEFT_SIM_LAMP_AS; state++) {
+            const bool has_number = state >= WEFT_SIM_LAMP_LATE;
+            const int most = state == WEFT_SIM_LAMP_AS ? WEFT_SIM_N_LIGHTS - 1 : 1000000;
+            if (strcmp(words[1], states[state]) != 0 || n != (has_number ? 3 : 2) ||
+                (has_number && !(weft_text_to_int(words[2], &number) && number >= 0 && number <= most)))
                 continue;
-            weft_controller_sim_set_lamp(board->sim, lamp, (weft_sim_lamp_state)state, (uint32_t)us);
+            weft_controller_sim_set_lamp(board->sim, lamp, (weft_sim_lamp_state)state, (uint32_t)number);
             return ok();
         }
-    return refuse("wanted: board lamp 0..9 good, on, off, open or late MICROSECONDS");
+    return refuse("wanted: board lamp 0..9 good, on, off, open, late MICROSECONDS or as LAMP");
 }
 
 static bool read_chance(const char *word, double *chance)

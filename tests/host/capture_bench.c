@@ -52,20 +52,28 @@ static weft_err bench_configure(void *state, const weft_camera_settings *wanted,
     return WEFT_OK;
 }
 
-double light_at(const double on[N_LIGHTS])
+/* A lamp's side of the picture is the brighter: 1 in its corner, 0.7 in the one across. */
+static double side_of(int lamp, int u, int v)
+{
+    const double angle = 2 * acos(-1) * lamp / N_LIGHTS, c = cos(angle), s = sin(angle);
+    const double across = (c * (2.0 * u / WIDTH - 1) + s * (2.0 * v / HEIGHT - 1)) / (fabs(c) + fabs(s));
+    return 0.85 + 0.15 * across;
+}
+
+double light_at(const double on[N_LIGHTS], int u, int v)
 {
     double light = bench.room;
     for (int i = 0; i < N_LIGHTS; i++)
         if (!(bench.broken_lamps >> i & 1))
-            light += bench.power * on[i] * (bench.faint_lamps >> i & 1 ? 0.2 : 1);
+            light += bench.power * on[i] * (bench.faint_lamps >> i & 1 ? 0.2 : 1) * side_of(i, u, v);
     return light * bench_set.exposure_s * bench_set.gain;
 }
 
-/* Red, green and blue see 0.5, 1 and 0.7 of the light; a gentle slope makes the picture one. */
+/* Red, green and blue see 0.5, 1 and 0.7 of the light. */
 uint16_t sample_at(double light, weft_cfa cfa, int u, int v)
 {
     static const double colour[3] = {0.5, 1, 0.7};
-    const double share = light * colour[weft_cfa_colour(cfa, u, v)] * (1 - 0.1 * u / WIDTH);
+    const double share = light * colour[weft_cfa_colour(cfa, u, v)];
     return (uint16_t)fmin(BLACK + (WHITE - BLACK) * share + 0.5, WHITE);
 }
 
@@ -118,10 +126,9 @@ static weft_err bench_expose(void *state, double deadline_s, weft_camera_idle_fn
     for (int i = 0; i < 4; i++)
         frame->mosaic.black[i] = BLACK;
     frame->mosaic.white = WHITE;
-    const double light = light_at(on);
     for (int v = 0; v < HEIGHT; v++)
         for (int u = 0; u < WIDTH; u++)
-            frame->mosaic.data[v * WIDTH + u] = sample_at(light, WEFT_CFA_GBRG, u, v);
+            frame->mosaic.data[v * WIDTH + u] = sample_at(light_at(on, u, v), WEFT_CFA_GBRG, u, v);
     return WEFT_OK;
 }
 

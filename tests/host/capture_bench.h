@@ -38,9 +38,9 @@ extern weft_camera_settings bench_set;
 /** The board's serial line. */
 extern char pty[128];
 
-/** What the camera sees with the lamps on for these shares of the exposure, and what that gives at a
- * photosite. */
-double light_at(const double on[N_LIGHTS]);
+/** What the camera sees at a photosite with the lamps on for these shares of the exposure, and what that
+ * gives there. */
+double light_at(const double on[N_LIGHTS], int u, int v);
 uint16_t sample_at(double light, weft_cfa cfa, int u, int v);
 
 /** A camera like that of set_up(), with bench.serial. */

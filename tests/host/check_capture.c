@@ -50,7 +50,8 @@ static void test_a_full_set(void **state)
         assert_near(info.exposure_s, 0.04, 1e-6);
         bench_set = (weft_camera_settings){.exposure_s = 0.04, .gain = 1};
         for (int p = 0; p < WIDTH * HEIGHT; p++)
-            assert_true(abs((int)m.data[p] - sample_at(light_at(on), m.cfa, p % WIDTH, p / WIDTH)) <= 1);
+            assert_true(abs((int)m.data[p] -
+                            sample_at(light_at(on, p % WIDTH, p / WIDTH), m.cfa, p % WIDTH, p / WIDTH)) <= 1);
         weft_mosaic_fini(&m);
     }
     weft_set_fini(&set);

@@ -80,6 +80,17 @@ jq -e --slurpfile set own.set/set.json '.frame == ($set[0].frames[] | select(.li
 "$weft" rig --dir r --tell "truth t" >tell.out || fail "truth"
 "$weft" solve own.set -c t/truth.cal -o own.maps -q || fail "solve of the set with brackets"
 
+# A wire that goes to another lamp: the controller says all is well, the picture does not.
+"$weft" rig --dir r --tell "board lamp 5 as 2" >tell.out || fail "board lamp 5 as 2"
+"$weft" rig --dir r --tell "board lamp 5 as 12" >tell.out 2>tell.err && fail "there is no lamp 12"
+"$weft" capture wire.set --rig r -q --lights 2,5,7 --exposure 0.03 2>capture.err
+[ $? = 1 ] || fail "another lamp: the exit status is not 1"
+grep -q "light 5: the same picture as under light 2 (they differ by 0.[0-9]* %): does its wire go to that lamp?" capture.err ||
+    fail "another lamp: says $(cat capture.err)"
+"$weft" rig --dir r --tell "board lamp 5 good" >tell.out || fail "board lamp 5 good"
+"$weft" capture wire.set --rig r -q --resume --json >wire.json || fail "another lamp: the second attempt"
+jq -e '.kept == 2 and .taken == 2' wire.json >tell.out || fail "another lamp: $(cat wire.json)"
+
 # A relative folder is the client's, not the rig's.
 mkdir elsewhere
 (cd elsewhere && "$weft" rig --dir ../r --tell "truth out 0.5") >tell.out || fail "truth"
