@@ -8,14 +8,7 @@
  */
 #include "host/solve/cloth_lobe.h"
 #include "host/solve/normal_equations.h"
-
-/* Squares beyond three sigma count no more. */
-static const float cut2 = 9.0F;
-/* A triple whose directions span less volume than this says little; more keeps the smallest singular value
- * above WEFT_SOLVE_MIN_SINGULAR. */
-static const float least_volume = 0.08F;
-/* Triples tried of more than FEW_LIGHTS lights; all of 12 lights are as many. */
-enum { MOST_TRIPLES = 220 };
+#include "host/solve/triples.h"
 
 /* ---- least squares with weights, and the answers ---- */
 
@@ -113,173 +106,44 @@ static void solve_robust(const weft_solve_samples *restrict samples, weft_solve_
 
 /* ---- the search ---- */
 
-typedef struct candidates {
-    float x[WEFT_LANES], y[WEFT_LANES], z[WEFT_LANES], cost[WEFT_LANES];
-} candidates;
-
-typedef struct lane_vectors {
-    float x[WEFT_LANES], y[WEFT_LANES], z[WEFT_LANES];
-} lane_vectors;
-
-/* Up to this many lights every triple is tried, and the cross products of all pairs are kept. */
-enum { FEW_LIGHTS = 12, FEW_PAIRS = FEW_LIGHTS * (FEW_LIGHTS - 1) / 2 };
-
-/* Light and sample over sigma; 0 for what is left out. */
-typedef struct scaled_light {
-    lane_vectors light;
-    float grey[WEFT_LANES], weight[WEFT_LANES];
-} scaled_light;
-
-/* 1 / sigma^2 of every sample; 0 for what is left out. */
+/* 1 / sigma^2 of every sample, 0 for what is left out; and the lights as the search wants them. */
 WEFT_INLINE void weigh(const weft_solve_samples *s, const weft_lane_weights *weights,
-                       const float peak[WEFT_LANES], weft_lane_weights *inverse, scaled_light *scaled)
+                       const float peak[WEFT_LANES], weft_lane_weights *inverse, weft_triple_light *lights)
 {
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
-            const float tolerance = WEFT_SOLVE_MISFIT * peak[k];
+            const float tolerance = WEFT_SOLVE_MISFIT * peak[k], used = weights[j].at[k];
             const float variance = s->at[j].variance[k] + tolerance * tolerance;
-            const float over2 = weights[j].at[k] / (variance > 0 ? variance : 1.0F), over = sqrtf(over2);
+            const float over2 = used / (variance > 0 ? variance : 1.0F), over = sqrtf(over2);
+            const float x = s->at[j].light[0][k], y = s->at[j].light[1][k], z = s->at[j].light[2][k];
             inverse[j].at[k] = over2;
-            scaled[j].weight[k] = weights[j].at[k];
-            scaled[j].grey[k] = over * s->at[j].grey[k];
-            scaled[j].light.x[k] = over * s->at[j].light[0][k];
-            scaled[j].light.y[k] = over * s->at[j].light[1][k];
-            scaled[j].light.z[k] = over * s->at[j].light[2][k];
+            lights[j].light.x[k] = used > 0 ? x : 0.0F;
+            lights[j].light.y[k] = used > 0 ? y : 0.0F;
+            lights[j].light.z[k] = used > 0 ? z : 0.0F;
+            lights[j].grey[k] = s->at[j].grey[k];
+            lights[j].scaled.x[k] = used > 0 ? over * x : 0.0F;
+            lights[j].scaled.y[k] = used > 0 ? over * y : 0.0F;
+            lights[j].scaled.z[k] = used > 0 ? over * z : 0.0F;
+            lights[j].scaled_grey[k] = over * s->at[j].grey[k];
+            lights[j].over[k] = over;
         }
-}
-
-WEFT_INLINE void cross(const weft_solve_light *a, const weft_solve_light *b, lane_vectors *to)
-{
-#pragma omp simd
-    for (int k = 0; k < WEFT_LANES; k++) {
-        to->x[k] = a->light[1][k] * b->light[2][k] - a->light[2][k] * b->light[1][k];
-        to->y[k] = a->light[2][k] * b->light[0][k] - a->light[0][k] * b->light[2][k];
-        to->z[k] = a->light[0][k] * b->light[1][k] - a->light[1][k] * b->light[0][k];
-    }
-}
-
-/* Three lights and the cross products of their pairs. */
-typedef struct triple {
-    int i, j, l;
-    const lane_vectors *ij, *il, *jl;
-} triple;
-
-/* The scaled normal that three lights agree on, by Cramer's rule; cost infinite where there is none. */
-WEFT_INLINE void agree(const weft_solve_samples *s, const scaled_light *scaled, const triple *t,
-                       candidates *to)
-{
-    const weft_solve_light *const a = &s->at[t->i], *const b = &s->at[t->j], *const c = &s->at[t->l];
-#pragma omp simd
-    for (int k = 0; k < WEFT_LANES; k++) {
-        const float volume =
-            t->ij->x[k] * c->light[0][k] + t->ij->y[k] * c->light[1][k] + t->ij->z[k] * c->light[2][k];
-        const float used = scaled[t->i].weight[k] * scaled[t->j].weight[k] * scaled[t->l].weight[k];
-        const int fit = (fabsf(volume) > least_volume) & (used > 0);
-        const float over = 1 / (fit ? volume : 1.0F);
-        to->x[k] = over * (a->grey[k] * t->jl->x[k] - b->grey[k] * t->il->x[k] + c->grey[k] * t->ij->x[k]);
-        to->y[k] = over * (a->grey[k] * t->jl->y[k] - b->grey[k] * t->il->y[k] + c->grey[k] * t->ij->y[k]);
-        to->z[k] = over * (a->grey[k] * t->jl->z[k] - b->grey[k] * t->il->z[k] + c->grey[k] * t->ij->z[k]);
-        to->cost[k] = fit ? 0.0F : INFINITY;
-    }
-}
-
-/* Adds what the lights of `first` to `last` do not agree with. */
-WEFT_INLINE void add_cost(const scaled_light *scaled, int first, int last, candidates *v)
-{
-    for (int m = first; m < last; m++)
-#pragma omp simd
-        for (int k = 0; k < WEFT_LANES; k++) {
-            const float d =
-                scaled[m].grey[k] - (v->x[k] * scaled[m].light.x[k] + v->y[k] * scaled[m].light.y[k] +
-                                     v->z[k] * scaled[m].light.z[k]);
-            const float q = d * d;
-            v->cost[k] += q < cut2 ? q : cut2;
-        }
-}
-
-WEFT_INLINE void try_triple(const weft_solve_samples *s, const scaled_light *scaled, const triple *t,
-                            candidates *best)
-{
-    candidates v;
-    agree(s, scaled, t, &v);
-    add_cost(scaled, 0, t->i, &v); /* its own three lights it fits */
-    add_cost(scaled, t->i + 1, t->j, &v);
-    add_cost(scaled, t->j + 1, t->l, &v);
-    add_cost(scaled, t->l + 1, s->n_lights, &v);
-#pragma omp simd
-    for (int k = 0; k < WEFT_LANES; k++) {
-        const int better = v.cost[k] < best->cost[k];
-        best->cost[k] = better ? v.cost[k] : best->cost[k];
-        best->x[k] = better ? v.x[k] : best->x[k];
-        best->y[k] = better ? v.y[k] : best->y[k];
-        best->z[k] = better ? v.z[k] : best->z[k];
-    }
-}
-
-/* Where the pair (i, j), i < j, of n lights is kept. */
-static inline int pair_of(int i, int j, int n)
-{
-    return i * n - i * (i + 1) / 2 + j - i - 1;
-}
-
-WEFT_INLINE void try_all(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
-{
-    _Alignas(64) lane_vectors pairs[FEW_PAIRS];
-    const int n = s->n_lights;
-    for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++)
-            cross(&s->at[i], &s->at[j], &pairs[pair_of(i, j, n)]);
-    for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++)
-            for (int l = j + 1; l < n; l++) {
-                const triple t = {
-                    i, j, l, &pairs[pair_of(i, j, n)], &pairs[pair_of(i, l, n)], &pairs[pair_of(j, l, n)]};
-                try_triple(s, scaled, &t, best);
-            }
-}
-
-/* Of many lights' triples every so many, in the order (0, 1, 2), (0, 1, 3), ..., of which only the ones that
- * are tried are come by: the triples that begin with i, or with i and j, are stepped over together. */
-WEFT_INLINE void try_some(const weft_solve_samples *s, const scaled_light *scaled, candidates *best)
-{
-    const long n = s->n_lights, all = n * (n - 1) * (n - 2) / 6;
-    long i = 0, j = 1, of_i = 0, of_j = 0; /* the numbers of the first triples with i, and with i and j */
-    for (long tried = 0; tried < MOST_TRIPLES; tried++) {
-        const long number = (2 * tried + 1) * all / (2L * MOST_TRIPLES);
-        while (number >= of_i + (n - 1 - i) * (n - 2 - i) / 2) {
-            of_i += (n - 1 - i) * (n - 2 - i) / 2;
-            i++;
-            of_j = of_i;
-            j = i + 1;
-        }
-        while (number >= of_j + n - 1 - j) {
-            of_j += n - 1 - j;
-            j++;
-        }
-        const int l = (int)(j + 1 + number - of_j);
-        lane_vectors ij, il, jl;
-        cross(&s->at[i], &s->at[j], &ij);
-        cross(&s->at[i], &s->at[l], &il);
-        cross(&s->at[j], &s->at[l], &jl);
-        const triple t = {(int)i, (int)j, l, &ij, &il, &jl};
-        try_triple(s, scaled, &t, best);
-    }
 }
 
 /* Samples within three sigma of the best candidate; all that were not dark where there is none, or where
  * they would not determine a normal. */
 WEFT_INLINE void keep_agreeing(const weft_solve_samples *s, const weft_lane_weights *inverse,
-                               const candidates *best, const weft_lane_weights *lit, weft_lane_weights *kept)
+                               const weft_triple_best *best, const weft_lane_weights *lit,
+                               weft_lane_weights *kept)
 {
     for (int j = 0; j < s->n_lights; j++)
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
-            const float d =
-                s->at[j].grey[k] - (best->x[k] * s->at[j].light[0][k] + best->y[k] * s->at[j].light[1][k] +
-                                    best->z[k] * s->at[j].light[2][k]);
-            const int agrees = (d * d * inverse[j].at[k] < cut2) & (lit[j].at[k] > 0);
-            kept[j].at[k] = best->cost[k] < INFINITY ? (agrees ? 1.0F : 0.0F) : lit[j].at[k];
+            const float d = s->at[j].grey[k] - (best->normal.x[k] * s->at[j].light[0][k] +
+                                                best->normal.y[k] * s->at[j].light[1][k] +
+                                                best->normal.z[k] * s->at[j].light[2][k]);
+            const int agrees = (d * d * inverse[j].at[k] < WEFT_TRIPLE_CUT2) & (lit[j].at[k] > 0);
+            kept[j].at[k] = best->cost[k] < WEFT_TRIPLE_NONE ? (agrees ? 1.0F : 0.0F) : lit[j].at[k];
         }
 }
 
@@ -287,24 +151,20 @@ static WEFT_CLONES void search_robust(const weft_solve_samples *restrict samples
                                       weft_solve_answers *restrict answers)
 {
     _Alignas(64) weft_lane_weights lit[WEFT_LIGHTS_MAX], inverse[WEFT_LIGHTS_MAX], kept[WEFT_LIGHTS_MAX];
-    _Alignas(64) scaled_light scaled_lights[WEFT_LIGHTS_MAX];
+    _Alignas(64) weft_triple_light lights[WEFT_LIGHTS_MAX];
     float peak[WEFT_LANES], dropped[WEFT_LANES], mark[WEFT_LANES];
-    candidates best = {0};
+    weft_triple_best best;
     weft_lane_sums t;
     weft_lane_normals scaled;
     weft_lane_misfits m;
     weft_lane_peak(samples, peak);
     weft_lane_leave_shadows(samples, lit, dropped);
-    weigh(samples, lit, peak, inverse, scaled_lights);
+    weigh(samples, lit, peak, inverse, lights);
+    weft_triples_search(lights, samples->n_lights, &best);
     for (int k = 0; k < WEFT_LANES; k++) {
-        best.cost[k] = INFINITY;
         mark[k] = 1;
         answers->search[k] = 0;
     }
-    if (samples->n_lights <= FEW_LIGHTS)
-        try_all(samples, scaled_lights, &best);
-    else
-        try_some(samples, scaled_lights, &best);
     keep_agreeing(samples, inverse, &best, lit, kept);
     solve_weighted(samples, kept, &t, &scaled, answers);
     weft_lane_measure(samples, kept, &scaled, &m);
