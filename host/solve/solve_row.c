@@ -280,10 +280,11 @@ void weft_solve_gather(const weft_solve_plan *plan, int row, int block, const we
 }
 
 /* Lanes [0, n) of the answers to columns [first, first + n). */
-static void scatter(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out, int first,
-                    int n)
+WEFT_INLINE void scatter_lanes(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out,
+                               int first, int n)
 {
     const size_t bytes = (size_t)n * sizeof(float);
+    uint8_t lights[LANES], quality[LANES], valid[LANES];
     for (int c = 0; c < 3; c++)
         memcpy(out->normal[c] + first, a->normal[c], bytes);
     for (int c = 0; c < n_channels; c++)
@@ -291,11 +292,25 @@ static void scatter(const weft_solve_answers *a, int n_channels, const weft_solv
     memcpy(out->residual + first, a->residual, bytes);
     memcpy(out->confidence + first, a->confidence, bytes);
     memcpy(out->angle + first, a->angle, bytes);
-    for (int k = 0; k < n; k++) {
-        out->lights[first + k] = (uint8_t)a->n_used[k];
-        out->quality[first + k] = (uint8_t)a->quality[k];
-        out->valid[first + k] = a->valid[k] > 0 ? 255 : 0;
+#pragma omp simd
+    for (int k = 0; k < LANES; k++) {
+        lights[k] = (uint8_t)(int)a->n_used[k];
+        quality[k] = (uint8_t)a->quality[k];
+        valid[k] = a->valid[k] > 0 ? 255 : 0;
     }
+    memcpy(out->lights + first, lights, (size_t)n);
+    memcpy(out->quality + first, quality, (size_t)n);
+    memcpy(out->valid + first, valid, (size_t)n);
+}
+
+/* Most blocks are whole, and their copies of a constant size. */
+WEFT_CLONES static void scatter(const weft_solve_answers *a, int n_channels, const weft_solve_row_out *out,
+                                int first, int n)
+{
+    if (n == LANES)
+        scatter_lanes(a, n_channels, out, first, LANES);
+    else
+        scatter_lanes(a, n_channels, out, first, n);
 }
 
 /* ---- pixels that ask for a search: gathered over the row until they fill the lanes ---- */
