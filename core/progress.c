@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 static volatile sig_atomic_t cancel_requested;
+static bool hiding;
 
 double weft_clock_s(void)
 {
@@ -42,6 +43,11 @@ void weft_cancel_request(bool yes)
     cancel_requested = yes;
 }
 
+void weft_progress_hide(bool on)
+{
+    hiding = on;
+}
+
 static void report(const weft_progress *p)
 {
     weft_report_send(json_pack("{s:{s:s, s:s, s:I, s:I}}", "progress", "what", p->what, "unit", p->unit,
@@ -56,8 +62,9 @@ void weft_progress_begin(weft_progress *p, const char *what, const char *unit, l
                          .total = total,
                          .started_s = now,
                          .shown_s = now,
+                         .hidden = hiding,
                          .terminal = isatty(STDERR_FILENO) != 0};
-    if (weft_report_active())
+    if (weft_report_active() && !hiding)
         report(p);
 }
 
@@ -93,6 +100,8 @@ weft_err weft_progress_step(weft_progress *p, long n, weft_error *err)
     if (cancel_requested)
         return weft_fail(err, WEFT_ERR_CANCELLED, "%s: cancelled after %ld of %ld %s", p->what, p->done,
                          p->total, p->unit);
+    if (p->hidden)
+        return WEFT_OK;
     const double now = weft_clock_s();
     if (weft_report_active()) { /* the listener shows it */
         if (now - p->shown_s >= 0.1 || p->done == p->total) {

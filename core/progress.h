@@ -18,6 +18,7 @@ typedef struct weft_progress {
     long done, total;
     double started_s, shown_s; /* monotonic clock */
     bool terminal, shown;
+    bool hidden; /* begun while weft_progress_hide() was on */
 } weft_progress;
 
 /** Begins; `total` is the number of units, 0 when unknown. */
@@ -29,6 +30,10 @@ weft_err weft_progress_step(weft_progress *p, long n, weft_error *err);
 
 /** Ends; leaves the terminal on a fresh line.  Harmless when never begun (all zero). */
 void weft_progress_end(weft_progress *p);
+
+/** While on, work that begins is not shown or reported, and still cancelled: steps of a longer work that
+ * shows its own progress. */
+void weft_progress_hide(bool on);
 
 /** Installs the SIGINT/SIGTERM handler that makes weft_cancelled() true; a second SIGINT kills. */
 void weft_cancel_on_signals(void);

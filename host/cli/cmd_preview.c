@@ -3,6 +3,7 @@
 #include "host/cli/preview_input.h"
 #include "host/cli/preview_lights.h"
 #include "host/cli/preview_match.h"
+#include "host/cli/preview_sequence.h"
 
 #include "core/file.h"
 #include "core/formats/image_file.h"
@@ -18,12 +19,12 @@ typedef struct preview_args {
     const char *output, *brdf, *match, *cal, *env, *columns;
     weft_texts params, lamps;
     weft_numbers light, light_mm, crop, sky;
-    int shape, area, sky_model, tone, sweep, shadow_steps, shadow_blur, folds, voxels;
-    bool draft, self_shadow;
+    int shape, area, sky_model, tone, sweep, turntable, quality, shadow_steps, shadow_blur, folds, voxels;
+    bool draft, self_shadow, resume;
     const char *height_map;
     int filter, taps;
     weft_size size;
-    double exposure_ev, env_scale, ambient, background, repeat, fov_deg;
+    double fps, exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
 
 static const weft_field fields[] = {
@@ -104,7 +105,32 @@ static const weft_field fields[] = {
      .min = 0,
      .max = 999,
      .def = "0",
-     .help = "so many pictures NAME-000.png on, the lamps going once round the z axis"},
+     .help = "so many pictures, the lamps going once round the z axis: NAME-000.png on, or one NAME.webp"},
+    {.key = "turntable",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, turntable),
+     .min = 0,
+     .max = 999,
+     .def = "0",
+     .help = "so many pictures, the sample going once round under lamps and camera that stay"},
+    {.key = "fps",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, fps),
+     .min = 0.1,
+     .max = 100,
+     .def = "12",
+     .help = "frames a second of a WebP"},
+    {.key = "quality",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, quality),
+     .min = 0,
+     .max = 100,
+     .def = "90",
+     .help = "of a WebP; 100 is lossless"},
+    {.key = "resume",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(preview_args, resume),
+     .help = "keep the frames that an interrupted run has left, when its options and maps are the same"},
     {.key = "columns",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(preview_args, columns),
@@ -305,33 +331,32 @@ static weft_err look(const preview_args *a, const char *path, const weft_preview
     return status;
 }
 
-static void turn(double v[3], double angle)
+static bool is_sequence(const preview_args *a)
 {
-    const double x = v[0], y = v[1];
-    v[0] = cos(angle) * x - sin(angle) * y;
-    v[1] = sin(angle) * x + cos(angle) * y;
+    return a->sweep || a->turntable;
 }
 
-/* "ball.png" is ball-000.png, ball-001.png, ... with the lamps turned a step each. */
-static weft_err sweep(const weft_invocation *inv, const preview_args *a, const weft_preview_input *input,
-                      weft_preview_view *view, double *seconds, weft_error *err)
+/* Many pictures, and what to say of them. */
+static weft_err look_round(const weft_invocation *inv, const preview_args *a, const weft_preview_input *input,
+                           const weft_preview_view *view, weft_error *err)
 {
-    const char *const dot = strrchr(weft_path_name(a->output), '.');
-    const int stem = (int)(dot ? (size_t)(dot - a->output) : strlen(a->output));
-    for (int frame = 0; frame < a->sweep; frame++) {
-        char *const path = weft_asprintf(err, "%.*s-%03d%s", stem, a->output, frame, dot ? dot : "");
-        weft_err status = path ? weft_file_refuse_existing(path, inv->force, err) : WEFT_ERR_NOMEM;
-        if (status == WEFT_OK)
-            status = look(a, path, input, view, seconds, err);
-        weft_free(path);
-        WEFT_TRY(status);
-        for (int k = 0; k < view->n_lights; k++) {
-            const double step = 2 * 3.14159265358979323846 / a->sweep;
-            turn(view->lights[k].direction, step);
-            turn(view->lights[k].position_mm, step);
-            turn(view->lights[k].end_mm, step);
-        }
-    }
+    weft_preview_sequence_report done;
+    const weft_preview_sequence sequence = {.output = a->output,
+                                            .n_frames = a->turntable ? a->turntable : a->sweep,
+                                            .turntable = a->turntable > 0,
+                                            .resume = a->resume,
+                                            .frames_per_s = a->fps,
+                                            .quality = a->quality,
+                                            .tone = (weft_tone)a->tone};
+    WEFT_TRY(weft_preview_sequence_render(inv, &sequence, &input->surface, view, &done, err));
+    if (inv->json)
+        return weft_print_json(inv,
+                               json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:f}", "output", a->output, "brdf",
+                                         a->brdf, "width", view->width, "height", view->height, "frames",
+                                         sequence.n_frames, "kept", done.kept, "render_s", done.seconds),
+                               err);
+    fprintf(inv->out, "%s: %d frames of %d x %d, %s, %d of them kept, %.2f s\n", a->output, sequence.n_frames,
+            view->width, view->height, a->brdf, done.kept, done.seconds);
     return WEFT_OK;
 }
 
@@ -405,8 +430,8 @@ static weft_err look_at_input(const weft_invocation *inv, const preview_args *a,
         input.surface.texture = &input.texture;
     }
     if (status == WEFT_OK)
-        status = a->sweep ? sweep(inv, a, &input, view, seconds, err)
-                          : look(a, a->output, &input, view, seconds, err);
+        status = is_sequence(a) ? look_round(inv, a, &input, view, err)
+                                : look(a, a->output, &input, view, seconds, err);
     weft_preview_input_fini(&input);
     return status == WEFT_OK || !folder ? status : weft_prefix(err, status, "%s", folder);
 }
@@ -442,11 +467,16 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
         return weft_fail(err, WEFT_ERR_USAGE, "--self-shadow goes with neither --match nor --columns");
     if (a->height_map && !a->self_shadow)
         return weft_fail(err, WEFT_ERR_USAGE, "--height-map wants --self-shadow");
+    if (is_sequence(a) && (a->match || a->columns || (a->sweep && a->turntable)))
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--sweep and --turntable go neither with each other nor with --match or --columns");
+    if (!is_sequence(a) && (a->resume || weft_path_has_suffix(a->output, ".webp")))
+        return weft_fail(err, WEFT_ERR_USAGE, "--resume and a .webp want --sweep N or --turntable N");
     if (!a->match != !a->cal)
         return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
     if (a->match && !inv->n_operands)
         return weft_fail(err, WEFT_ERR_USAGE, "--match wants the INPUT that was solved from the set");
-    if (!a->sweep)
+    if (!is_sequence(a))
         WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     WEFT_TRY(set_view(a, &view, err));
     if (a->env || a->sky.n) {
@@ -458,7 +488,8 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
         a->columns ? look_at_grid(inv, a, &view, err) : look_at_input(inv, a, &view, &seconds, err);
     weft_preview_around_fini(&around);
     WEFT_TRY(status);
-    return a->match ? WEFT_OK : report(inv, a, (weft_size){view.width, view.height}, seconds, err);
+    return a->match || is_sequence(a) ? WEFT_OK
+                                      : report(inv, a, (weft_size){view.width, view.height}, seconds, err);
 }
 
 const weft_command weft_cmd_preview = {
@@ -479,6 +510,8 @@ const weft_command weft_cmd_preview = {
         "origin\n"
         "on a plane, from the middle of the other shapes.",
     .example =
-        "weft preview twill.maps -o twill.png --brdf cloth --param f0=0.1 --shape sphere --light 60,30",
+        "weft preview twill.maps -o twill.png --brdf cloth --param f0=0.1 --shape sphere --light 60,30\n"
+        "  weft preview twill.maps -o twill.webp --shape drape --turntable 48 --resume\n"
+        "  weft preview twill.maps -o twill-shadows.png --self-shadow --light 20,20",
     .run = run,
 };

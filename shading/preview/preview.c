@@ -312,6 +312,8 @@ static weft_err prepare(weft_preview_setup *setup, int *finest, weft_error *err)
     WEFT_TRY(check_surface(surface, view, err));
     WEFT_TRY(find_crop(surface, view, &setup->crop, err));
     set_ranges(setup);
+    setup->turn_cos = view->turn_rad != 0 ? cos(view->turn_rad) : 1;
+    setup->turn_sin = view->turn_rad != 0 ? sin(view->turn_rad) : 0;
     weft_preview_setup_shape(setup);
     const bool filtered =
         view->filter != WEFT_PREVIEW_SAMPLES && !surface->mask && weft_preview_surface_levels(surface) > 1;
@@ -343,15 +345,19 @@ static weft_err choose_texture(weft_preview_setup *setup, int finest, weft_previ
     return setup->texture == own ? weft_preview_texture_init(own, setup->surface, finest, err) : WEFT_OK;
 }
 
-weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
+weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *given,
                              weft_image *picture, weft_error *err)
 {
+    weft_preview_view turned = *given;
+    const weft_preview_view *const view = &turned;
     weft_preview_setup setup = {.surface = surface, .view = view};
     weft_preview_texture own = {0};
     weft_preview_visibility visibility = {0};
     weft_image made = {0};
     int finest;
     WEFT_TRY(prepare(&setup, &finest, err));
+    if (given->turn_rad != 0)
+        weft_preview_turn_lamps(&setup, &turned);
     weft_err status = choose_texture(&setup, finest, &own, err);
     if (status == WEFT_OK && wants_visibility(view)) {
         status = weft_preview_visibility_init(&visibility, &setup, err);

@@ -167,6 +167,8 @@ typedef struct weft_preview_view {
     bool draft;             /* one sample a pixel, at its middle: for maps filtered to the pixels' size */
     weft_preview_filter filter; /* where all maps have chains and nothing is masked; else samples */
     int max_taps;               /* 1..WEFT_PREVIEW_MAX_TAPS */
+    double turn_rad;            /* the sample turns under lamps and camera: a plane about the viewer's axis
+                                   (anticlockwise), the others about the upright one (front to the right) */
     double fov_deg;             /* 0: orthographic; else the camera's field of view over the shorter side */
 } weft_preview_view;
 

@@ -18,17 +18,21 @@ typedef struct footprint {
  * shape's tangent plane.  On the sphere, whose map is equidistant along the meridians, the steps across them
  * cover theta/sin(theta) more.
  */
-WEFT_INLINE void step_over_map(const weft_preview_samples *s, int i, int axis, float round, float step[2])
+WEFT_INLINE void step_over_map(const weft_preview_samples *s, int i, const float screen[3], float round,
+                               float step[2])
 {
     const float nx = s->axis[2][0][i], ny = s->axis[2][1][i];
-    float te = 0, be = 0, ne = 0;
+    float te = 0, be = 0, ne = 0, ts = 0, bs = 0, ns = 0;
     for (int c = 0; c < 3; c++) {
         te += s->axis[0][c][i] * s->eye[c][i];
         be += s->axis[1][c][i] * s->eye[c][i];
         ne += s->axis[2][c][i] * s->eye[c][i];
+        ts += s->axis[0][c][i] * screen[c];
+        bs += s->axis[1][c][i] * screen[c];
+        ns += s->axis[2][c][i] * screen[c];
     }
-    const float lean = s->axis[2][axis][i] / weft_max(ne, 0.02F);
-    const float p = s->axis[0][axis][i] - te * lean, q = s->axis[1][axis][i] - be * lean;
+    const float lean = ns / weft_max(ne, 0.02F);
+    const float p = ts - te * lean, q = bs - be * lean;
     const float sine2 = nx * nx + ny * ny, unit = 1 / sqrtf(weft_max(sine2, 1e-12F));
     const float rx = nx * unit, ry = ny * unit, across = (q * rx - p * ry) * (round - 1);
     step[0] = p - across * ry;
@@ -43,6 +47,11 @@ static void find_footprints(const weft_preview_setup *setup, const weft_preview_
     const float sphere = setup->view->shape == WEFT_PREVIEW_SPHERE ? 1 : 0;
     const float u0 = (float)(setup->crop.width / 2.0 - 0.5), v0 = (float)(setup->crop.height / 2.0 - 0.5);
     const float radius = sphere > 0 ? (float)setup->radius_texels : 1;
+    /* the picture's axes in the frame of a turned sample */
+    const float c = (float)setup->turn_cos, sine = (float)setup->turn_sin;
+    const bool plane = setup->view->shape == WEFT_PREVIEW_PLANE;
+    const float right[3] = {c, plane ? -sine : 0, plane ? 0 : sine};
+    const float up[3] = {plane ? sine : 0, plane ? c : 1, 0};
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
         const float u = (float)s->u[i] - u0, v = (float)s->v[i] - v0;
@@ -51,8 +60,8 @@ static void find_footprints(const weft_preview_setup *setup, const weft_preview_
         const float wide = theta / sqrtf(weft_max(sine2, 1e-6F)) - 1;
         const float round = 1 + sphere * (sine2 > 1e-6F ? wide : 0);
         float a[2], b[2];
-        step_over_map(s, i, 0, round, a);
-        step_over_map(s, i, 1, round, b);
+        step_over_map(s, i, right, round, a);
+        step_over_map(s, i, up, round, b);
         /* the ellipse's axes: eigenvalues of J J^T */
         const float aa = a[0] * a[0] + b[0] * b[0], bb = a[1] * a[1] + b[1] * b[1];
         const float ab = a[0] * a[1] + b[0] * b[1], half = 0.5F * (aa - bb), mean = 0.5F * (aa + bb);

@@ -42,13 +42,14 @@ typedef struct weft_preview_setup {
     const weft_preview_surface *surface;
     const weft_preview_view *view;
     weft_preview_crop crop;
-    int supersampling;    /* samples along a side of a pixel; even, or 1 */
-    double texels_per_px; /* plane: map pixels an output pixel; sphere: at the pole */
-    double radius_px;     /* sphere: of its outline, output pixels */
-    double radius_texels; /* sphere: of the sphere, map pixels */
-    double eye_distance;  /* 0: orthographic; plane: output pixels, sphere: radii */
-    int albedo_plane;     /* first plane of the parameter "albedo"; -1 when the model has none */
-    int alpha_plane;      /* of "alpha"; -1 when the model has none */
+    int supersampling;         /* samples along a side of a pixel; even, or 1 */
+    double texels_per_px;      /* plane: map pixels an output pixel; sphere: at the pole */
+    double radius_px;          /* sphere: of its outline, output pixels */
+    double radius_texels;      /* sphere: of the sphere, map pixels */
+    double turn_cos, turn_sin; /* of the view's turn */
+    double eye_distance;       /* 0: orthographic; plane: output pixels, sphere: radii */
+    int albedo_plane;          /* first plane of the parameter "albedo"; -1 when the model has none */
+    int alpha_plane;           /* of "alpha"; -1 when the model has none */
     const struct weft_preview_visibility *visibility;             /* NULL: no shadows but those by formula */
     const weft_preview_texture *texture;                          /* NULL: the maps are sampled */
     weft_environment_planes around;                               /* the view's surroundings; empty without */
@@ -60,6 +61,9 @@ void weft_preview_setup_shape(weft_preview_setup *setup);
 
 /** Fills hit, u, v, position, axis and eye from x and y. */
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s);
+
+/** Puts the view's lamps into the frame of the turned sample, as strong as before wherever they shine. */
+void weft_preview_turn_lamps(const weft_preview_setup *setup, weft_preview_view *view);
 
 /** Amplitude of the drape's deepest folds, in half widths. */
 #define WEFT_PREVIEW_DRAPE_DEPTH 0.14

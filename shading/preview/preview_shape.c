@@ -3,6 +3,8 @@
 #include "core/clones.h"
 #include "shading/brdf/half_vector.h"
 
+#include <string.h>
+
 #define SPHERE_SHARE      0.92 /* of the shorter side that the sphere's outline takes */
 #define ROLL_SHARE        0.7  /* the same of a roll */
 #define MAX_SUPERSAMPLING 16
@@ -61,7 +63,7 @@ static void set_axes(weft_preview_samples *s, int i, double x, double y, double 
 {
     /* The rotation that takes +Z to (x, y, z) the shortest way: the frame a flat cloth would keep when it is
      * laid on the sphere from the pole. */
-    const double k = 1 / (1 + z);
+    const double k = 1 / weft_max(1 + z, 1e-6); /* the far pole of a turned ball */
     const double axes[3][3] = {{1 - x * x * k, -x * y * k, -x}, {-x * y * k, 1 - y * y * k, -y}, {x, y, z}};
     for (int a = 0; a < 3; a++)
         for (int c = 0; c < 3; c++)
@@ -110,6 +112,22 @@ static void hit_plane(const weft_preview_setup *setup, weft_preview_samples *s)
     }
 }
 
+/* From the viewer's frame to that of a shape that is turned about its upright axis. */
+static void turn_back(const weft_preview_setup *setup, double v[3])
+{
+    const double x = v[0], z = v[2];
+    v[0] = setup->turn_cos * x - setup->turn_sin * z;
+    v[2] = setup->turn_sin * x + setup->turn_cos * z;
+}
+
+static void set_turned_eye(const weft_preview_setup *setup, weft_preview_samples *s, int i, double x,
+                           double y, double z)
+{
+    double eye[3] = {x, y, z};
+    turn_back(setup, eye);
+    set_eye(s, i, eye[0], eye[1], eye[2]);
+}
+
 /* Where the ray of a pixel meets the unit sphere; false beside it. */
 static bool meet_sphere(const weft_preview_setup *setup, double px, double py, double n[3])
 {
@@ -140,6 +158,11 @@ static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
     for (int i = 0; i < s->n; i++) {
         double n[3] = {0, 0, 1};
         s->hit[i] = meet_sphere(setup, (double)s->x[i], (double)s->y[i], n) ? 1 : 0;
+        if (eye > 0)
+            set_turned_eye(setup, s, i, -n[0], -n[1], eye - n[2]);
+        else
+            set_turned_eye(setup, s, i, 0, 0, 1);
+        turn_back(setup, n);
         const double sine = sqrt(n[0] * n[0] + n[1] * n[1]);
         const double arc = sine > 1e-9 ? radius * atan2(sine, n[2]) / sine : radius;
         s->u[i] = setup->crop.width / 2.0 - 0.5 + n[0] * arc;
@@ -147,10 +170,6 @@ static void hit_sphere(const weft_preview_setup *setup, weft_preview_samples *s)
         for (int c = 0; c < 3; c++)
             s->position_mm[c][i] = (float)(n[c] * radius * setup->surface->mm_per_px);
         set_axes(s, i, n[0], n[1], n[2]);
-        if (eye > 0)
-            set_eye(s, i, -n[0], -n[1], eye - n[2]);
-        else
-            set_eye(s, i, 0, 0, 1);
     }
 }
 
@@ -160,9 +179,11 @@ static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
     for (int i = 0; i < s->n; i++) {
         const double x = (double)s->x[i] / setup->radius_px, y = (double)s->y[i] / setup->radius_px;
         const bool on = fabs(x) < 1 && fabs(y) <= SPHERE_SHARE / ROLL_SHARE;
-        const double nx = on ? x : 0, nz = sqrt(1 - nx * nx);
+        double n[3] = {on ? x : 0, 0, sqrt(1 - (on ? x * x : 0))};
+        turn_back(setup, n);
+        const double nx = n[0], nz = n[2];
         s->hit[i] = on;
-        s->u[i] = setup->crop.width / 2.0 - 0.5 + radius * asin(nx);
+        s->u[i] = setup->crop.width / 2.0 - 0.5 + radius * atan2(nx, nz);
         s->v[i] = setup->crop.height / 2.0 - 0.5 - radius * y;
         const double axes[3][3] = {{nz, 0, -nx}, {0, 1, 0}, {nx, 0, nz}}, at[3] = {nx, y, nz};
         for (int a = 0; a < 3; a++) {
@@ -170,7 +191,7 @@ static void hit_roll(const weft_preview_setup *setup, weft_preview_samples *s)
             for (int c = 0; c < 3; c++)
                 s->axis[a][c][i] = (float)axes[a][c];
         }
-        set_eye(s, i, 0, 0, 1);
+        set_turned_eye(setup, s, i, 0, 0, 1);
     }
 }
 
@@ -210,14 +231,75 @@ static void set_drape_axes(weft_preview_samples *s, int i, const double slope[2]
     }
 }
 
+/* A ray over the folds at one height y: where it is at t, and how far over them (0 beside the cloth). */
+static double over_drape(const double from[3], const double along[3], double t, double y)
+{
+    const double x = from[0] + t * along[0], deep = FOLD_DEPTH * (2 - y) / 3;
+    return fabs(x) <= 1 ? from[2] + t * along[2] - deep * cos(WEFT_PI * FOLDS * x + 0.35 * (y + 1)) : 0;
+}
+
+/* Where the ray of a pixel meets the turned drape: the first change of side inside of the folds' slab, in
+ * steps of a thirtieth of the half width, then bisection. */
+static bool meet_drape(const weft_preview_setup *setup, double px, double y, double *x)
+{
+    enum { HALVINGS = 16 };
+    double from[3] = {px, y, 1.5}, along[3] = {0, 0, -1}, low = 0, high = 3;
+    turn_back(setup, from);
+    turn_back(setup, along);
+    const double slab[2] = {1, FOLD_DEPTH + 1e-3};
+    for (int k = 0; k < 2; k++) { /* |x| below 1, |z| below the depth */
+        const int c = 2 * k;
+        if (fabs(along[c]) < 1e-9)
+            continue;
+        const double a = (-slab[k] - from[c]) / along[c], b = (slab[k] - from[c]) / along[c];
+        low = fmax(low, fmin(a, b));
+        high = fmin(high, fmax(a, b));
+    }
+    if (low >= high || fabs(y) > 1)
+        return false;
+    const int steps = 2 + (int)(30 * (high - low));
+    const double first = low, step = (high - low) / steps;
+    double before = 0;
+    bool met = false;
+    for (int k = 0; k <= steps && !met; k++) {
+        const double t = first + step * k, over = over_drape(from, along, t, y);
+        met = over * before < 0;
+        low = met ? low : t;
+        high = met ? t : high;
+        before = met ? before : over;
+    }
+    for (int k = 0; k < HALVINGS && met; k++) {
+        const double t = 0.5 * (low + high);
+        const bool same = over_drape(from, along, t, y) * before > 0;
+        low = same ? t : low;
+        high = same ? high : t;
+    }
+    *x = from[0] + 0.5 * (low + high) * along[0];
+    return met;
+}
+
+/* The far side of the drape: its own normal points away. */
+static void face_the_eye(weft_preview_samples *s, int i)
+{
+    double towards = 0;
+    for (int c = 0; c < 3; c++)
+        towards += (double)s->eye[c][i] * (double)s->axis[2][c][i];
+    for (int c = 0; c < 3 && towards < 0; c++) {
+        s->axis[0][c][i] = -s->axis[0][c][i];
+        s->axis[2][c][i] = -s->axis[2][c][i];
+    }
+}
+
 static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const double half = setup->radius_texels, scale = half * setup->surface->mm_per_px;
+    const bool turned = setup->turn_sin != 0 || setup->turn_cos != 1;
     for (int i = 0; i < s->n; i++) {
-        double slope[2];
-        const double x = (double)s->x[i] / setup->radius_px, y = (double)s->y[i] / setup->radius_px;
+        double slope[2], x = (double)s->x[i] / setup->radius_px;
+        const double y = (double)s->y[i] / setup->radius_px;
+        const bool met = turned ? meet_drape(setup, x, y, &x) : fabs(x) <= 1 && fabs(y) <= 1;
         const double z = weft_preview_drape_height(x, y, slope);
-        s->hit[i] = fabs(x) <= 1 && fabs(y) <= 1;
+        s->hit[i] = met;
         s->drape[0][i] = x;
         s->drape[1][i] = y;
         s->u[i] = setup->crop.width / 2.0 - 0.5 + half * drape_length(x, y);
@@ -226,11 +308,13 @@ static void hit_drape(const weft_preview_setup *setup, weft_preview_samples *s)
         s->position_mm[1][i] = (float)(y * scale);
         s->position_mm[2][i] = (float)(z * scale);
         set_drape_axes(s, i, slope);
-        set_eye(s, i, 0, 0, 1);
+        set_turned_eye(setup, s, i, 0, 0, 1);
+        if (turned)
+            face_the_eye(s, i);
     }
 }
 
-/* Marches towards the light until the ray is above all folds. */
+/* Marches towards the light until the ray is above all folds, or below them when the light is behind. */
 double weft_preview_drape_light(const double place[2], const double lamp[3])
 {
     enum { STEPS = 48 };
@@ -238,12 +322,15 @@ double weft_preview_drape_light(const double place[2], const double lamp[3])
     double slope[2];
     const double z = weft_preview_drape_height(x, y, slope),
                  across = sqrt(lamp[0] * lamp[0] + lamp[1] * lamp[1]);
-    const double reach = lamp[2] > 0 ? (FOLD_DEPTH - z) / lamp[2] : 2 / weft_max(across, 1e-6);
+    const double side = lamp[2] - slope[0] * lamp[0] - slope[1] * lamp[1] < 0 ? -1 : 1, rise = side * lamp[2];
+    const double reach = rise > 0 ? (FOLD_DEPTH - side * z) / rise : 2 / weft_max(across, 1e-6);
     for (int k = 1; k <= STEPS; k++) {
         const double t = 0.01 + reach * k / STEPS, px = x + t * lamp[0], py = y + t * lamp[1];
         if (fabs(px) > 1 || fabs(py) > 1)
             break;
-        if (z + t * lamp[2] < weft_preview_drape_height(px, py, slope) - 1e-3)
+        const double deep = FOLD_DEPTH * (2 - py) / 3,
+                     fold = deep * cos(WEFT_PI * FOLDS * px + 0.35 * (py + 1));
+        if (side * (z + t * lamp[2] - fold) < -1e-3)
             return 0;
     }
     return 1;
@@ -275,11 +362,31 @@ void weft_preview_place(const weft_preview_setup *setup, const weft_preview_samp
     }
 }
 
+/* The plane turns about the viewer's axis: the samples are turned back, and afterwards put where they were.
+ */
+static void hit_turned_plane(const weft_preview_setup *setup, weft_preview_samples *s)
+{
+    float x[WEFT_PREVIEW_RUN], y[WEFT_PREVIEW_RUN];
+    const float c = (float)setup->turn_cos, sine = (float)setup->turn_sin;
+    memcpy(x, s->x, sizeof x);
+    memcpy(y, s->y, sizeof y);
+    for (int i = 0; i < s->n; i++) {
+        s->x[i] = c * x[i] + sine * y[i];
+        s->y[i] = c * y[i] - sine * x[i];
+    }
+    hit_plane(setup, s);
+    memcpy(s->x, x, sizeof x);
+    memcpy(s->y, y, sizeof y);
+}
+
 void weft_preview_hit(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     switch (setup->view->shape) {
     case WEFT_PREVIEW_PLANE:
-        hit_plane(setup, s);
+        if (setup->turn_sin != 0 || setup->turn_cos != 1)
+            hit_turned_plane(setup, s);
+        else
+            hit_plane(setup, s);
         break;
     case WEFT_PREVIEW_SPHERE:
         hit_sphere(setup, s);

@@ -63,6 +63,19 @@ static void aim_mirror(const weft_preview_setup *setup, const glossy *g, const w
     }
 }
 
+/* Directions in the frame of a turned shape to those of the panorama, whose zenith is the axis of the turn.
+ */
+WEFT_CLONES
+static void turn_round(float cosine, float sine, int n, float *x, float *y)
+{
+    WEFT_INDEPENDENT
+    for (int i = 0; i < n; i++) {
+        const float was = x[i];
+        x[i] = cosine * was - sine * y[i];
+        y[i] = sine * was + cosine * y[i];
+    }
+}
+
 /* Adds light to one channel; parameters that the model has not are planes of a constant. */
 WEFT_CLONES
 static void add_channel(const float *albedo, const float *f0, const around *a, int c, float scale,
@@ -93,6 +106,10 @@ static void add_glossy(const weft_preview_setup *setup, const glossy *g, weft_pr
     const float scale = (float)setup->view->surroundings.scale;
     around a;
     aim_mirror(setup, g, s, &a);
+    if (setup->turn_sin != 0 || setup->turn_cos != 1) {
+        turn_round((float)setup->turn_cos, (float)setup->turn_sin, s->n, a.normal[0], a.normal[1]);
+        turn_round((float)setup->turn_cos, (float)setup->turn_sin, s->n, a.mirror[0], a.mirror[1]);
+    }
     const float *const normal[3] = {a.normal[0], a.normal[1], a.normal[2]};
     const float *const mirror[3] = {a.mirror[0], a.mirror[1], a.mirror[2]};
     float *const irradiance[3] = {a.irradiance[0], a.irradiance[1], a.irradiance[2]};

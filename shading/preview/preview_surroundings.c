@@ -11,8 +11,9 @@ enum { N_DIRECTIONS = 32 };
 static void to_panorama(const weft_preview_setup *setup, const double world[3], double d[3])
 {
     const bool lies = setup->view->shape == WEFT_PREVIEW_PLANE;
-    d[0] = world[0];
-    d[1] = lies ? world[1] : -world[2];
+    const double y = lies ? world[1] : -world[2]; /* the zenith is the axis of the turn too */
+    d[0] = setup->turn_cos * world[0] - setup->turn_sin * y;
+    d[1] = setup->turn_sin * world[0] + setup->turn_cos * y;
     d[2] = lies ? world[2] : world[1];
 }
 

@@ -82,10 +82,47 @@ expect 0 'pano.png' "$weft" preview weave.maps -o pano.png --env sky.png --lamp 
 expect 0 'roll.png' "$weft" preview weave.maps -o roll.png --shape cylinder --lamp ball:-40,40,60,9,2 --area representative --size 40x40
 expect 0 'grid.png: 348 x' "$weft" preview -o grid.png --brdf ggx,cloth --columns alpha=0.1,0.3,0.9 --shape sphere --size 100x60
 expect 0 'lamps.png: 196 x' "$weft" preview -o lamps.png --columns lamps --lamp 0,30 --lamp tube:-9,0,9,9,0,9 --shape sphere --size 80x80
-expect 0 '' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30
+expect 0 '3 frames' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30
 is_png turn-002.png 40 30
 ! cmp -s turn-000.png turn-001.png
 expect 1 'turn-000.png' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30
+# resumed: what is there stays as it is, what is missing comes out the same; other options are refused
+cp turn-001.png kept.png && rm turn-001.png && touch -d @1000000000 turn-000.png
+expect 0 '2 of them kept' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30 --resume
+cmp turn-001.png kept.png && [ "$(stat -c %Y turn-000.png)" = 1000000000 ]
+expect 1 'other options' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30 --resume --light 10,20
+expect 1 'other options' "$weft" preview sensor.maps -o turn.png --sweep 3 --size 40x30 --resume
+printf '{' >turn.sequence.json
+expect 1 'turn.sequence.json' "$weft" preview weave.maps -o turn.png --sweep 3 --size 40x30 --resume
+# an animation that is killed goes on where it stopped, and then is what an uninterrupted one is
+for shape in plane sphere cylinder drape; do
+    expect 0 '"kept":0' "$weft" preview weave.maps -o $shape.webp --shape $shape --turntable 4 --size 30x24 --draft --quality 100 --json
+done
+long=("$weft" preview -q weave.maps -o late.webp --shape drape --turntable 999 --size 240x240 --draft --resume)
+for frame in 001 003; do # each run is stopped when it has made a frame of its own
+    "${long[@]}" >out 2>&1 &
+    runner=$! status=0
+    for ((i = 0; i < 3000 && status == 0; i++)); do
+        [ ! -e late.webp.frames/$frame.png ] || break
+        sleep 0.05
+        kill -0 $runner 2>/dev/null || status=1
+    done
+    kill -INT $runner
+    wait $runner || status=$?
+    [ $status = 130 ] && [ -e late.webp.frames/$frame.png ] && [ ! -e late.webp ]
+    [ $frame = 003 ] || touch -d @1000000000 late.webp.frames/000.png
+done
+[ "$(stat -c %Y late.webp.frames/000.png)" = 1000000000 ]
+expect 1 'interrupted run' "$weft" preview weave.maps -o late.webp --turntable 4 --size 30x24
+expect 0 '"kept":0' "$weft" preview weave.maps -o late.webp --shape drape --turntable 4 --size 30x24 --draft --quality 100 --force --json
+cmp late.webp drape.webp && [ ! -e late.webp.frames ]
+webpinfo drape.webp >info && [ "$(grep -c 'Chunk ANMF' info)" = 4 ] && grep -q 'No error' info
+webpmux -info drape.webp >info && grep -q 'Canvas size: 30 x 24' info && grep -q 'Number of frames: 4' info
+webpmux -get frame 1 drape.webp -o first.webp >out 2>&1 && dwebp -quiet first.webp -o first.png
+expect 0 '' "$weft" preview weave.maps -o still.png --shape drape --size 30x24 --draft
+expect 0 'PSNR             inf' "$weft" compare first.png still.png
+expect 2 'want --sweep N' "$weft" preview weave.maps -o x.webp
+expect 2 'neither with each other' "$weft" preview weave.maps -o x.webp --sweep 2 --turntable 2
 expect 2 'no lamp is written' "$weft" preview -o x.png --lamp ball:1,2
 expect 2 'radius above 0' "$weft" preview -o x.png --lamp ball:0,0,10,12
 expect 2 'EL from 0 to 90' "$weft" preview -o x.png --sky 10,-5
