@@ -17,14 +17,14 @@
 
 typedef struct preview_args {
     const char *output, *brdf, *match, *cal, *env, *columns;
-    weft_texts params, lamps;
+    weft_texts params, lamps, polarise;
     weft_numbers light, light_mm, crop, sky;
     int shape, area, sky_model, tone, sweep, turntable, quality, shadow_steps, shadow_blur, folds, voxels;
     bool draft, self_shadow, resume;
     const char *height_map;
     int filter, taps;
     weft_size size;
-    double fps, exposure_ev, env_scale, ambient, background, repeat, fov_deg;
+    double hour, ambient_saturation, fps, exposure_ev, env_scale, ambient, background, repeat, fov_deg;
 } preview_args;
 
 static const weft_field fields[] = {
@@ -86,6 +86,26 @@ static const weft_field fields[] = {
      .choices = "cie-clear|far-cry-3",
      .def = "cie-clear",
      .help = "the constants of the sky"},
+    {.key = "polarise",
+     .type = WEFT_FIELD_TEXTS,
+     .offset = offsetof(preview_args, polarise),
+     .unit = "R,G,B",
+     .help = "Far Cry 3's polarising filter: a factor on the sky that is mirrored, not on the diffuse light; "
+             "several HOUR:R,G,B are a day"},
+    {.key = "hour",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, hour),
+     .min = 0,
+     .max = 24,
+     .def = "12",
+     .help = "of the day, between the keys of --polarise"},
+    {.key = "ambient-saturation",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, ambient_saturation),
+     .min = 0,
+     .max = 1,
+     .def = "1",
+     .help = "of the diffuse light of --env and --sky; 0 is grey"},
     {.key = "env-scale",
      .type = WEFT_FIELD_F64,
      .offset = offsetof(preview_args, env_scale),
@@ -467,6 +487,8 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
         return weft_fail(err, WEFT_ERR_USAGE, "--self-shadow goes with neither --match nor --columns");
     if (a->height_map && !a->self_shadow)
         return weft_fail(err, WEFT_ERR_USAGE, "--height-map wants --self-shadow");
+    if (a->polarise.n && !a->env && !a->sky.n)
+        return weft_fail(err, WEFT_ERR_USAGE, "--polarise wants a --sky or --env to filter");
     if (is_sequence(a) && (a->match || a->columns || (a->sweep && a->turntable)))
         return weft_fail(err, WEFT_ERR_USAGE,
                          "--sweep and --turntable go neither with each other nor with --match or --columns");
@@ -480,8 +502,11 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
         WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     WEFT_TRY(set_view(a, &view, err));
     if (a->env || a->sky.n) {
-        WEFT_TRY(weft_preview_around_init(
-            &around, a->env, &a->sky, a->sky_model == 0 ? &weft_sky_cie_clear : &weft_sky_far_cry_3, err));
+        weft_sky_filter filter = {.ambient_saturation = a->ambient_saturation};
+        WEFT_TRY(weft_preview_polariser(&a->polarise, a->hour, filter.factor, err));
+        WEFT_TRY(weft_preview_around_init(&around, a->env, &a->sky,
+                                          a->sky_model == 0 ? &weft_sky_cie_clear : &weft_sky_far_cry_3,
+                                          &filter, err));
         view.surroundings = (weft_preview_surroundings){&around.map, &around.table, a->env_scale};
     }
     const weft_err status =

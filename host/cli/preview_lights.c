@@ -73,8 +73,46 @@ weft_err weft_preview_lamp(const char *text, weft_preview_light *light, weft_err
     return check_lamp(text, light, err);
 }
 
+static weft_err read_key(const char *text, bool with_hour, weft_polariser_key *key, weft_error *err)
+{
+    numbers_arg arg = {0};
+    char hour[32] = "0";
+    const char *const colon = strchr(text, ':');
+    if (colon && colon - text < (ptrdiff_t)sizeof hour) {
+        memcpy(hour, text, (size_t)(colon - text));
+        hour[colon - text] = '\0';
+    }
+    bool good = !with_hour == !colon && weft_field_parse(&numbers_field, hour, &arg, NULL) == WEFT_OK;
+    good = good && arg.numbers.n == 1 && arg.numbers.values[0] >= 0 && arg.numbers.values[0] <= 24;
+    key->hour = arg.numbers.values[0];
+    good = good && weft_field_parse(&numbers_field, colon ? colon + 1 : text, &arg, NULL) == WEFT_OK &&
+           arg.numbers.n == 3;
+    for (int c = 0; c < 3 && good; c++) {
+        key->factor[c] = arg.numbers.values[c];
+        good = key->factor[c] >= 0 && key->factor[c] <= 1;
+    }
+    return good
+               ? WEFT_OK
+               : weft_fail(err, WEFT_ERR_USAGE,
+                           "--polarise %s: wanted R,G,B from 0 to 1, or several HOUR:R,G,B by ascending hour",
+                           text);
+}
+
+weft_err weft_preview_polariser(const weft_texts *texts, double hour, double factor[3], weft_error *err)
+{
+    weft_polariser_key keys[WEFT_TEXTS_MAX] = {{.factor = {1, 1, 1}}};
+    for (int k = 0; k < texts->n; k++) {
+        WEFT_TRY(read_key(texts->values[k], texts->n > 1 || strchr(texts->values[k], ':'), &keys[k], err));
+        if (k > 0 && keys[k].hour < keys[k - 1].hour)
+            return weft_fail(err, WEFT_ERR_USAGE,
+                             "--polarise %s: its hour is before that of the one in front", texts->values[k]);
+    }
+    weft_polariser_at(texts->n > 0 ? texts->n : 1, keys, hour, factor);
+    return WEFT_OK;
+}
+
 weft_err weft_preview_around_init(weft_preview_around *around, const char *file, const weft_numbers *sky_deg,
-                                  const weft_sky *sky, weft_error *err)
+                                  const weft_sky *sky, const weft_sky_filter *filter, weft_error *err)
 {
     weft_image panorama = {0};
     *around = (weft_preview_around){0};
@@ -86,7 +124,7 @@ weft_err weft_preview_around_init(weft_preview_around *around, const char *file,
         WEFT_TRY(weft_environment_paint_sky(&panorama, sky, (90 - sky_deg->values[1]) * WEFT_PI / 180,
                                             sky_deg->values[0] * WEFT_PI / 180, err));
     }
-    weft_err status = weft_environment_map_init(&around->map, &panorama, err);
+    weft_err status = weft_environment_map_init_filtered(&around->map, &panorama, filter, err);
     weft_image_fini(&panorama);
     if (status != WEFT_OK)
         return file ? weft_prefix(err, status, "%s", file) : status;

@@ -18,10 +18,14 @@ typedef struct weft_preview_around {
     weft_environment_table table;
 } weft_preview_around;
 
+/** Reads a polarising filter: "R,G,B" (0..1), or several "HOUR:R,G,B" of which that of `hour` is found
+ *  between the keys.  No texts: no filter.  @return WEFT_ERR_USAGE saying what was wanted */
+weft_err weft_preview_polariser(const weft_texts *texts, double hour, double factor[3], weft_error *err);
+
 /** Reads a panorama (EXR, or PNG/TIFF in sRGB), or paints the sky with the sun at {azimuth, elevation} in
  *  degrees, and makes surroundings of it.  One of `file` and `sky_deg` is given. */
 weft_err weft_preview_around_init(weft_preview_around *around, const char *file, const weft_numbers *sky_deg,
-                                  const weft_sky *sky, weft_error *err);
+                                  const weft_sky *sky, const weft_sky_filter *filter, weft_error *err);
 void weft_preview_around_fini(weft_preview_around *around);
 
 #endif

@@ -30,7 +30,7 @@ const weft_job_kind weft_job_kinds[] = {
     {.command = "lint", .reads = "*"},
     {.command = "weave", .reads = "*", .writes = "output|picture"},
     {.command = "bake", .reads = "*|library", .writes = "output", .texts = "material|export", .never = "format"},
-    {.command = "preview", .reads = "*|match|calibration|env|height-map", .writes = "output", .texts = "brdf|param|lamp|columns"},
+    {.command = "preview", .reads = "*|match|calibration|env|height-map", .writes = "output", .texts = "brdf|param|lamp|columns|polarise"},
     {.command = "contact", .reads = "*", .writes = "output", .texts = "brdf|param"},
     {.command = "library reindex", .reads = "library", .in_library = true},
     {0},

@@ -214,7 +214,37 @@ static weft_err make_levels(weft_environment_map *map, const pyramid *from, weft
     return WEFT_OK;
 }
 
+/* The filter before the camera, on the upper half of every mip. */
+static void filter_sky(pyramid *p, const double factor[3])
+{
+    for (int level = 0; level < p->n; level++)
+        for (int c = 0; c < 3; c++)
+            for (int y = 0; 2 * y + 1 <= p->mips[level].height; y++) {
+                /* a row across the horizon is half sky */
+                const double sky = 2 * y + 2 <= p->mips[level].height ? 1 : 0.5;
+                float *const row = weft_image_row(&p->mips[level], c, y);
+                for (int x = 0; x < p->mips[level].width; x++)
+                    row[x] *= (float)(1 + sky * (factor[c] - 1));
+            }
+}
+
+static void desaturate(double light[3][WEFT_SH_COUNT], double saturation)
+{
+    static const double luma[3] = {0.2126, 0.7152, 0.0722};
+    for (int k = 0; k < WEFT_SH_COUNT; k++) {
+        const double y = luma[0] * light[0][k] + luma[1] * light[1][k] + luma[2] * light[2][k];
+        for (int c = 0; c < 3; c++)
+            light[c][k] = y + saturation * (light[c][k] - y);
+    }
+}
+
 weft_err weft_environment_map_init(weft_environment_map *map, const weft_image *panorama, weft_error *err)
+{
+    return weft_environment_map_init_filtered(map, panorama, &(weft_sky_filter){{1, 1, 1}, 1}, err);
+}
+
+weft_err weft_environment_map_init_filtered(weft_environment_map *map, const weft_image *panorama,
+                                            const weft_sky_filter *filter, weft_error *err)
 {
     weft_environment_map made = {0};
     pyramid from = {0};
@@ -224,6 +254,9 @@ weft_err weft_environment_map_init(weft_environment_map *map, const weft_image *
     weft_err status = pyramid_init(&from, panorama, err);
     if (status == WEFT_OK) {
         project(&from.mips[0], made.light);
+        if (filter->ambient_saturation != 1)
+            desaturate(made.light, filter->ambient_saturation);
+        filter_sky(&from, filter->factor);
         status = make_levels(&made, &from, err);
     }
     pyramid_fini(&from);

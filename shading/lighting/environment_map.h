@@ -9,6 +9,7 @@
 #define WEFT_SHADING_LIGHTING_ENVIRONMENT_MAP_H
 
 #include "core/image.h"
+#include "shading/lighting/polariser.h"
 #include "shading/lighting/sky.h"
 
 /** Level l is filtered for the roughness l/(WEFT_ENVIRONMENT_LEVELS - 1), alpha its square. */
@@ -30,6 +31,9 @@ typedef struct weft_environment_map {
  * @param panorama  1 or 3 planes; not finite or negative values count as 0
  */
 weft_err weft_environment_map_init(weft_environment_map *map, const weft_image *panorama, weft_error *err);
+/** The same behind a filter: its factor is on what is looked at and mirrored, not on the diffuse light. */
+weft_err weft_environment_map_init_filtered(weft_environment_map *map, const weft_image *panorama,
+                                            const weft_sky_filter *filter, weft_error *err);
 void weft_environment_map_fini(weft_environment_map *map);
 
 /** Paints a sky, black below the horizon, scaled so that a level white card reads 1 (irradiance pi).  The

@@ -126,6 +126,14 @@ expect 2 'neither with each other' "$weft" preview weave.maps -o x.webp --sweep 
 expect 2 'no lamp is written' "$weft" preview -o x.png --lamp ball:1,2
 expect 2 'radius above 0' "$weft" preview -o x.png --lamp ball:0,0,10,12
 expect 2 'EL from 0 to 90' "$weft" preview -o x.png --sky 10,-5
+expect 0 'blue.png' "$weft" preview -o blue.png --brdf ggx --shape sphere --sky 225,40 --lamp 225,40 --tone agx --size 48x48 --polarise 0.4,0.6,1
+! cmp -s sky.png blue.png
+expect 0 'noon.png' "$weft" preview -o noon.png --brdf ggx --shape sphere --sky 225,40 --lamp 225,40 --tone agx --size 48x48 --polarise 6:1,1,1 --polarise 12:0.4,0.6,1 --ambient-saturation 1
+cmp noon.png blue.png
+expect 2 'wanted R,G,B' "$weft" preview -o x.png --sky 10,5 --polarise 2,1,1
+expect 2 'wanted R,G,B' "$weft" preview -o x.png --sky 10,5 --polarise 25:1,1,1
+expect 2 'before that' "$weft" preview -o x.png --sky 10,5 --polarise 5:1,1,1 --polarise 4:1,1,1
+expect 2 'wants a --sky' "$weft" preview -o x.png --polarise 1,1,1
 expect 2 'two ways' "$weft" preview -o x.png --sky 10,5 --env sky.png
 expect 2 '"lamps" with some' "$weft" preview -o x.png --columns lamps
 expect 1 'no/such.exr' "$weft" preview -o x.png --env no/such.exr
