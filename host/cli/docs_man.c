@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 const char *const weft_docs_rules[] = {
     "Results go to stdout, everything else to stderr.",
@@ -150,11 +151,11 @@ static void hyphenate(const char *words, char name[64], bool capitals)
 static weft_err begin(page *p, const char *date, const char *program, int section, const char *summary,
                       weft_error *err)
 {
-    int year = 0, month = 0, day = 0;
+    struct tm day = {0};
     char name[64], capitals[64];
     *p = (page){0};
-    if (sscanf(date, "%4d-%2d-%2d", &year, &month, &day) != 3 || month < 1 || month > 12 || day < 1 ||
-        day > 31)
+    const char *const behind = strptime(date, "%Y-%m-%d", &day);
+    if (!behind || *behind)
         return weft_fail(err, WEFT_ERR_USAGE, "%s: wanted a date as 2026-11-23", date);
     p->out = open_memstream(&p->text, &p->n);
     if (!p->out)
@@ -162,8 +163,8 @@ static weft_err begin(page *p, const char *date, const char *program, int sectio
     hyphenate(program, name, false);
     hyphenate(program, capitals, true);
     fprintf(p->out, ".\\\" Written by weft-docs man; do not edit.\n");
-    fprintf(p->out, ".Dd %s %d, %d\n.Dt %s %d\n.Os Weft %s\n", months[month - 1], day, year, capitals,
-            section, WEFT_VERSION);
+    fprintf(p->out, ".Dd %s %d, %d\n.Dt %s %d\n.Os Weft %s\n", months[day.tm_mon], day.tm_mday,
+            day.tm_year + 1900, capitals, section, WEFT_VERSION);
     fprintf(p->out, ".Sh NAME\n.Nm %s\n.Nd ", name);
     put_sentence(p->out, summary);
     return WEFT_OK;

@@ -27,7 +27,7 @@ refused() { # WORDS OPTIONS...
     [ $? = 2 ] || fail "capture $*: the exit status is not 2"
     grep -qF -- "$words" capture.err || fail "capture $*: says $(cat capture.err)"
 }
-for wrong in 0.04,0.05 each,auto 3:0.01,3:0.02 99:1 0.5:1 0.04, , soon 0 -1 nan 3:each 3: :1 0.04,3:0.01s; do
+for wrong in 0.04,0.05 each,auto 3:0.01,3:0.02 99:1 0.5:1 '0.04,' ',' soon 0 -1 nan 3:each 3: :1 0.04,3:0.01s; do
     refused "--exposure $wrong: wanted auto, each or" --exposure "$wrong"
 done
 for wrong in 0 10 1.5 3,1 3:0 3:auto 40:3 3: some; do
