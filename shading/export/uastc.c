@@ -352,7 +352,7 @@ static unsigned get(const uint8_t block[16], int *at, int bits)
 {
     unsigned value = 0;
     for (int k = 0; k < bits; k++, ++*at)
-        value |= (block[*at / 8] >> (*at & 7) & 1u) << k;
+        value |= ((unsigned)block[*at / 8] >> (*at & 7) & 1u) << k;
     return value;
 }
 
@@ -398,7 +398,7 @@ static void write_fit(fit *f, const float texels[16][4], uint8_t block[16])
     const mode *const m = f->mode;
     const etc1_hint hint = hint_etc1(texels);
     writer w = {block, 0};
-    uint8_t codes[8];
+    uint8_t codes[8] = {0};
     memset(block, 0, 16);
     anchor(f, 0);
     if (m->dual)
@@ -416,8 +416,8 @@ static void write_fit(fit *f, const float texels[16][4], uint8_t block[16])
     if (m->dual)
         put(&w, (unsigned)f->selector, 2);
     for (int c = 0; c < m->components; c++) {
-        codes[2 * c] = f->low[c];
-        codes[2 * c + 1] = f->high[c];
+        codes[2 * (size_t)c] = f->low[c];
+        codes[2 * (size_t)c + 1] = f->high[c];
     }
     put_endpoints(&w, m, codes, 2 * m->components);
     for (int i = 0; i < 16; i++)
@@ -485,12 +485,13 @@ static void decode_mode(const mode *m, const uint8_t block[16], uint8_t texels[1
     const int selector = m->dual ? (int)get(block, &at, 2) : -1;
     get_endpoints(block, &at, m, codes, 2 * m->components);
     for (int i = 0; i < 16; i++) {
-        int weights[2];
+        int weights[2] = {0, 0};
         for (int k = 0; k <= m->dual; k++)
             weights[k] = unquantise_weight((int)get(block, &at, m->weight_bits - (i == 0)), m->weight_bits);
         texels[i][3] = 255;
         for (int c = 0; c < m->components; c++) {
-            const int low = unquantise(m, codes[2 * c]) * 257, high = unquantise(m, codes[2 * c + 1]) * 257;
+            const int low = unquantise(m, codes[2 * (size_t)c]) * 257,
+                      high = unquantise(m, codes[2 * (size_t)c + 1]) * 257;
             const int w = weights[c == selector];
             texels[i][c] = (uint8_t)((low * (64 - w) + high * w + 32) >> 6 >> 8);
         }

@@ -413,7 +413,7 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, const w
         {"front_tint_color", WEFT_BAKED_FRONT_TINT, 3},  {"rim_tint_color", WEFT_BAKED_RIM_TINT, 3},
         {"rim_amplitude", WEFT_BAKED_RIM_AMPLITUDE, 1},  {"opacity", WEFT_BAKED_OPACITY, 1}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        double values[3];
+        double values[4] = {0};
         const weft_rad_member *const m = own(p, rows[i].property, inherited);
         if (!m || (only_said && weft_material_type_find(m->set_by)))
             continue;
@@ -426,14 +426,14 @@ static void apply_constants(weft_baked *baked, const weft_rad_record *p, const w
     const weft_rad_member *const rotation = own(p, "tangent_rotation_deg", inherited);
     if (rotation && !(only_said && weft_material_type_find(rotation->set_by))) {
         const double turn = weft_rad_number(p, "tangent_rotation_deg", 0) * acos(-1) / 180;
-        const double direction[2] = {cos(turn), sin(turn)};
+        const double direction[4] = {cos(turn), sin(turn), 0, 0};
         set_constant(baked, WEFT_BAKED_TANGENT, 2, direction);
     }
 }
 
 static void apply_factors(weft_baked *baked, const weft_rad_record *p, const weft_asset *inherited)
 {
-    static const double black[3] = {0, 0, 0};
+    static const double black[4] = {0, 0, 0, 0};
     double tint[3];
     if (own(p, "albedo_tint_color", inherited)) {
         weft_rad_colour(p, "albedo_tint_color", 1, tint);

@@ -168,7 +168,7 @@ typedef void combine_fn(const float *const values[], float *out);
 static weft_err put(const bake_job *job, weft_baked *baked, weft_baked_kind kind, const field *const *fields,
                     int n, combine_fn *combine, weft_error *err)
 {
-    float values[4][3] = {{0}}, out[4];
+    float values[4][3] = {{0}}, out[4] = {0};
     const float *const in[4] = {values[0], values[1], values[2], values[3]};
     bool varies = false;
     for (int k = 0; k < n; k++)

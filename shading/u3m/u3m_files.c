@@ -128,8 +128,10 @@ static weft_err parse_document(weft_u3m_files *f, json_t **document, weft_error 
             weft_fail(err, WEFT_ERR_FORMAT, "%s: line %d: %s; is it a U3M?", f->path, why.line, why.text);
     else if (!json_is_object(*document))
         status = weft_fail(err, WEFT_ERR_FORMAT, "%s: holds no JSON object; is it a U3M?", f->path);
-    if (status != WEFT_OK)
+    if (status != WEFT_OK) {
         json_decref(*document);
+        *document = NULL;
+    }
     weft_free(text);
     return status;
 }
@@ -137,6 +139,7 @@ static weft_err parse_document(weft_u3m_files *f, json_t **document, weft_error 
 weft_err weft_u3m_files_open(const char *path, weft_u3m_files **files, json_t **document, weft_error *err)
 {
     weft_u3m_files *const f = weft_alloc(1, sizeof *f, err);
+    *document = NULL;
     if (!f)
         return WEFT_ERR_NOMEM;
     f->path = weft_strdup(path, err);
@@ -149,8 +152,10 @@ weft_err weft_u3m_files_open(const char *path, weft_u3m_files **files, json_t **
         status = parse_document(f, document, err);
     if (status == WEFT_OK && !is_archive) {
         status = add_named_files(f, *document, err);
-        if (status != WEFT_OK)
+        if (status != WEFT_OK) {
             json_decref(*document);
+            *document = NULL;
+        }
     }
     if (status != WEFT_OK) {
         weft_u3m_files_close(f);
