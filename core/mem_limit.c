@@ -52,15 +52,14 @@ void weft_mem_set_limit(double bytes)
 double weft_mem_resident(void)
 {
     char text[128];
-    long long all, resident;
     const int file = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     if (file < 0)
         return 0;
     const ssize_t n = read(file, text, sizeof text - 1);
     close(file);
     text[n > 0 ? n : 0] = '\0';
-    return sscanf(text, "%lld %lld", &all, &resident) == 2 ? (double)resident * (double)sysconf(_SC_PAGESIZE)
-                                                           : 0;
+    const char *const second = strchr(text, ' '); /* pages: of the address space, in memory, ... */
+    return second ? (double)strtoll(second, NULL, 10) * (double)sysconf(_SC_PAGESIZE) : 0;
 }
 
 double weft_mem_peak(void)

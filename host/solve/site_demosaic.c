@@ -187,7 +187,7 @@ WEFT_INLINE void estimate_green(tile *t, int row, float *estimate)
 
 WEFT_INLINE void find_green(tile *t, int row)
 {
-    float estimate[SPAN];
+    float estimate[SPAN] = {0};
     const float *const own = row_of(&t->site, row);
     const int p = coloured(t, row);
     halves *const at_own = &t->own[row & (RING - 1)], *const at_green = &t->green[row & (RING - 1)];
@@ -270,7 +270,7 @@ WEFT_INLINE void interleave(const tile *t, const float *even, const float *odd, 
     float row[SPAN];
     for (int first = 0; first < t->span / 2; first += LANES)
 #pragma omp simd
-        for (int i = first; i < first + LANES; i++) {
+        for (ptrdiff_t i = first; i < first + LANES; i++) {
             row[2 * i] = even[i];
             row[2 * i + 1] = odd[i];
         }

@@ -7,7 +7,7 @@
 
 enum {
     LANES = WEFT_SOLVE_LANES,
-    AHEAD = 32,
+    AHEAD = 256,
     STRIDE_MAX = (WEFT_INCIDENCE_PLANES(WEFT_LIGHTS_MAX) + 15) / 16 * 16
 };
 
@@ -54,7 +54,7 @@ WEFT_INLINE void point_at_light(const weft_incidence *inc, const block_nodes *no
 {
     const float px = inc->light[j][0], py = inc->light[j][1], pz = inc->light[j][2];
     const float far = inc->distant[j] ? 0.0F : 1.0F, dz = pz - far * inc->height_mm;
-    float start[LANES];
+    float start[LANES] = {0};
     expand(nodes, step_log2, WEFT_INCIDENCE_OVER_DISTANCE(j), start);
 #pragma omp simd
     for (int k = 0; k < LANES; k++) {
@@ -207,17 +207,17 @@ WEFT_INLINE weft_solve_row_in copy_margin(const weft_solve_row_in *in, int first
         {m->rgb[0], m->rgb[1], m->rgb[2]}, m->clipped, in->least, in->most, in->read, in->shot};
 }
 
-/* More planes are read at once than the processor follows by itself: asks for what comes AHEAD blocks later
+/* More planes are read at once than the processor follows by itself: asks for what comes AHEAD pixels later
  * (past the row's end: for the next row). */
 WEFT_INLINE void fetch_ahead(const weft_solve_row_in *in, int first, int block)
 {
-    __builtin_prefetch(in->rgb[0] + first + AHEAD * LANES);
+    __builtin_prefetch(in->rgb[0] + first + AHEAD);
     if (in->rgb[1] != in->rgb[0]) {
-        __builtin_prefetch(in->rgb[1] + first + AHEAD * LANES);
-        __builtin_prefetch(in->rgb[2] + first + AHEAD * LANES);
+        __builtin_prefetch(in->rgb[1] + first + AHEAD);
+        __builtin_prefetch(in->rgb[2] + first + AHEAD);
     }
     if (in->clipped && block % (64 / LANES) == 0)
-        __builtin_prefetch(in->clipped + first + AHEAD * LANES);
+        __builtin_prefetch(in->clipped + first + AHEAD);
 }
 
 WEFT_INLINE void gather_with_step(const weft_solve_plan *plan, int step_log2, int row, int block,
