@@ -1,56 +1,24 @@
 #include "host/capture/capture.h"
 
 #include "core/file.h"
-#include "core/formats/raw_file.h"
 #include "core/log.h"
 #include "core/mem.h"
-#include "core/sha256.h"
-#include "host/capture/average.h"
+#include "core/progress.h"
+#include "host/capture/capture_private.h"
 #include "host/capture/exposures.h"
-#include "host/capture/light_print.h"
 #include "host/capture/live_picture.h"
 #include "host/capture/set_folder.h"
-#include "host/capture/shoot.h"
 #include "host/capture/sidecar.h"
 #include "host/capture/weights.h"
 
-#include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
-/* A frame with a light must beat the one without by 2 % (lamps of the room flicker) and by 0.05 % of the
- * range (8 of 16384 DN: the mean of a million photosites knows its offset much better than that). */
-#define BRIGHTER_FACTOR 1.02
-#define BRIGHTER_OFFSET 0.0005
-/* Clipped photosites of one colour that are worth a warning. */
-#define CLIPPED_SHARE 0.001
-/* Frames of one light have one shape to a few thousandths (noise; a lamp that warms up moves nothing); those
- * of two lamps of a dome differ by some hundredths at least.  Short exposures of a bracket have more noise.
- */
-#define SAME_SHAPE  0.005
-#define OTHER_SHAPE 0.03
-/* A room this bright costs range and adds its own noise. */
-#define BRIGHT_ROOM 0.05
 /* A DNG is its samples and some tags. */
 #define DNG_TAGS_BYTES 65536
 #define SPARE_BYTES    (UINT64_C(4) << 20)
 
-typedef struct capture_run {
-    weft_capture_options o; /* with nothing left to default */
-    weft_shooter shooter;
-    weft_capture_plan plan;
-    weft_set set;
-    weft_capture_report report;
-    weft_progress *progress;
-    bool has_dark_mean;
-    double dark_mean; /* mean of a frame without lights, share of the range per second and gain */
-    weft_light_print dark_print;
-    weft_light_print prints[WEFT_CAPTURE_MAX_LIGHTS]; /* of the middle exposures that there are */
-} capture_run;
-
-static weft_err complete_options(capture_run *run, const weft_controller_info *info, weft_error *err)
+static weft_err complete_options(weft_capture_state *run, const weft_controller_info *info, weft_error *err)
 {
     weft_capture_options *const o = &run->o;
     const int n = info->n_lights;
@@ -84,7 +52,7 @@ static weft_err complete_options(capture_run *run, const weft_controller_info *i
     return WEFT_OK;
 }
 
-static weft_err ask_camera(capture_run *run, double exposure_s, double *achieved_s, weft_error *err)
+static weft_err ask_camera(weft_capture_state *run, double exposure_s, double *achieved_s, weft_error *err)
 {
     WEFT_TRY(weft_shooter_set_camera(&run->shooter, exposure_s, run->o.gain, err));
     *achieved_s = weft_camera_get_state(run->shooter.camera)->exposure_s;
@@ -92,7 +60,7 @@ static weft_err ask_camera(capture_run *run, double exposure_s, double *achieved
 }
 
 /* Each exposure of the plan is told to the camera once, so that an impossible bracket fails at once. */
-static weft_err check_exposures(capture_run *run, weft_error *err)
+static weft_err check_exposures(weft_capture_state *run, weft_error *err)
 {
     double achieved_s;
     for (int i = 0; i < run->plan.n; i++) {
@@ -113,7 +81,7 @@ static int count_missing(const weft_capture_plan *plan)
     return n;
 }
 
-static weft_err check_disk(const capture_run *run, weft_error *err)
+static weft_err check_disk(const weft_capture_state *run, weft_error *err)
 {
     const weft_camera_state *const camera = weft_camera_get_state(run->shooter.camera);
     const int n = count_missing(&run->plan);
@@ -144,7 +112,7 @@ static char *name_of_folder(const char *folder, weft_error *err)
     return weft_asprintf(err, "%.*s", (int)(n - begin), folder + begin);
 }
 
-static weft_err describe_set(capture_run *run, weft_error *err)
+static weft_err describe_set(weft_capture_state *run, weft_error *err)
 {
     const weft_camera_state *const camera = weft_camera_get_state(run->shooter.camera);
     weft_set *const set = &run->set;
@@ -164,297 +132,7 @@ static weft_err describe_set(capture_run *run, weft_error *err)
     return WEFT_OK;
 }
 
-/* ---- one frame ---- */
-
-/* A light that does not light must not pass for a dark side of the cloth. */
-static void check_brightness(const capture_run *run, const weft_planned_frame *frame, weft_shot *shot)
-{
-    const double without = run->dark_mean * run->shooter.frame.exposure_s * run->shooter.frame.gain;
-    if (!frame->lights || !frame->middle || !run->has_dark_mean)
-        return;
-    if (shot->stats.mean <= without * BRIGHTER_FACTOR + BRIGHTER_OFFSET)
-        snprintf(shot->reason, sizeof shot->reason,
-                 "no brighter than without it (%.2f %% of the range, without %.2f %%): %s",
-                 100 * shot->stats.mean, 100 * without,
-                 without > BRIGHT_ROOM ? "does this lamp shine all the time?" : "is the lamp connected?");
-}
-
-static weft_light_print print_of_frame(const capture_run *run)
-{
-    const weft_captured_frame *const f = &run->shooter.frame;
-    return weft_light_print_make(&f->mosaic, f->exposure_s * f->gain);
-}
-
-/* The controller answers for its outputs; the picture for the lamps behind them. */
-static void check_shape(const capture_run *run, const weft_planned_frame *frame, weft_shot *shot)
-{
-    if (frame->role != WEFT_ROLE_LIGHT)
-        return;
-    const weft_light_print now = print_of_frame(run);
-    for (int light = 0; light < WEFT_CAPTURE_MAX_LIGHTS && !shot->reason[0]; light++) {
-        const double d = weft_light_print_difference(&now, &run->prints[light], &run->dark_print);
-        if (d < 0)
-            continue;
-        if (light == frame->light && !frame->middle && d > OTHER_SHAPE)
-            snprintf(
-                shot->reason, sizeof shot->reason,
-                "another picture than its exposure of %g s (they differ by %.1f %%): was another lamp on, or "
-                "did the sample move?",
-                run->prints[light].time / run->shooter.frame.gain, 100 * d);
-        else if (light != frame->light && frame->middle && d < SAME_SHAPE)
-            snprintf(
-                shot->reason, sizeof shot->reason,
-                "the same picture as under light %d (they differ by %.2f %%): does its wire go to that lamp?",
-                light, 100 * d);
-    }
-}
-
-/* A cable that was pulled out may be put in again.  Meanwhile the controller goes dark by itself, and what
- * was being exposed is void.  Any other failure stays one. */
-static weft_err come_back(capture_run *run, weft_err status, weft_error *why, weft_error *err)
-{
-    weft_controller *const c = run->shooter.controller;
-    if (!weft_controller_is_gone(c)) {
-        if (err)
-            *err = *why;
-        return status;
-    }
-    weft_warn("%s; waiting %g s for it", why->text, run->o.patience_s);
-    return weft_controller_reopen(c, run->o.patience_s, err);
-}
-
-/* One exposure; a controller that was unplugged and is back gives a reason to take it again. */
-static weft_err shoot(capture_run *run, const weft_planned_frame *frame, weft_shot *shot, weft_error *err)
-{
-    weft_error why = {0};
-    const weft_err status =
-        weft_shoot(&run->shooter, frame->lights, frame->exposure_s, run->o.gain, shot, &why);
-    if (status == WEFT_OK)
-        return WEFT_OK;
-    WEFT_TRY(come_back(run, status, &why, err));
-    snprintf(shot->reason, sizeof shot->reason, "the light controller was unplugged");
-    return WEFT_OK;
-}
-
-/* Takes the frame until it is good.  `retries` gets a reason for each one that was not. */
-static weft_err shoot_until_good(capture_run *run, const weft_planned_frame *frame, weft_shot *shot,
-                                 json_t *retries, weft_error *err)
-{
-    char what[32];
-    weft_planned_frame_words(frame, what);
-    for (int try = 1;; try++) {
-        const weft_err status = shoot(run, frame, shot, err);
-        if (status != WEFT_OK)
-            return weft_prefix(err, status, "%s", what);
-        if (!shot->reason[0])
-            check_brightness(run, frame, shot);
-        if (!shot->reason[0])
-            check_shape(run, frame, shot);
-        if (!shot->reason[0])
-            return WEFT_OK;
-        if (try >= run->o.tries)
-            return weft_fail(err, WEFT_ERR_DEVICE, "%s: %s (tried %d times)", what, shot->reason, try);
-        weft_warn("%s: %s; taking it again", what, shot->reason);
-        json_array_append_new(retries, json_string(shot->reason));
-        run->report.n_retries++;
-    }
-}
-
-/* Each of the frames is judged by itself; what is kept is their mean, as a DNG. */
-static weft_err shoot_mean(capture_run *run, const weft_planned_frame *frame, weft_shot *shot,
-                           json_t *retries, weft_error *err)
-{
-    weft_captured_frame *const f = &run->shooter.frame;
-    weft_average mean = {0};
-    weft_err status = WEFT_OK;
-    for (int i = 0; i < run->o.average && status == WEFT_OK; i++) {
-        status = shoot_until_good(run, frame, shot, retries, err);
-        if (status == WEFT_OK && run->o.average > 1)
-            status = weft_average_add(&mean, &f->mosaic, err);
-        if (status == WEFT_OK && weft_cancelled())
-            status = weft_fail(err, WEFT_ERR_CANCELLED, "cancelled");
-    }
-    if (status == WEFT_OK && run->o.average > 1) {
-        weft_average_get(&mean, &f->mosaic);
-        f->file.size = 0;
-        status = weft_frame_stats_make(&f->mosaic, &shot->stats, err);
-    }
-    weft_average_fini(&mean);
-    return status;
-}
-
-static void remember_dark_mean(capture_run *run, const weft_shot *shot)
-{
-    const weft_captured_frame *const f = &run->shooter.frame;
-    run->dark_mean = fmax(shot->stats.mean, 0) / (f->exposure_s * f->gain);
-    run->has_dark_mean = true;
-    run->dark_print = print_of_frame(run);
-    if (shot->stats.mean > BRIGHT_ROOM) {
-        weft_warn("the room is bright: %.0f %% of the range with all lights off; darken it",
-                  100 * shot->stats.mean);
-        run->report.n_warnings++;
-    }
-}
-
-/* What the lights are compared with when the set has or gets no ambient frame now. */
-static weft_err look_at_the_dark(capture_run *run, weft_error *err)
-{
-    const weft_planned_frame frame = {.role = WEFT_ROLE_AMBIENT,
-                                      .light = -1,
-                                      .exposure_s = weft_exposures_longest(&run->o),
-                                      .middle = true};
-    weft_shot shot;
-    json_t *const reasons = json_array();
-    const weft_err status = shoot_until_good(run, &frame, &shot, reasons, err);
-    json_decref(reasons);
-    if (status == WEFT_OK)
-        remember_dark_mean(run, &shot);
-    return status;
-}
-
-static void warn_of_clipping(capture_run *run, const weft_planned_frame *frame, const weft_shot *shot)
-{
-    const char *colour;
-    const double share = weft_frame_stats_clipped(&shot->stats, &colour);
-    if (!frame->shortest || share <= CLIPPED_SHARE)
-        return;
-    weft_warn("%s: %.1f %% of the %s pixels are clipped at %g s; give a shorter --exposure, or --bracket 3",
-              frame->file, 100 * share, colour, run->shooter.frame.exposure_s);
-    run->report.n_warnings++;
-}
-
-static json_t *describe_shot(const capture_run *run, const weft_planned_frame *frame, const weft_shot *shot,
-                             json_t *retries)
-{
-    char now[32];
-    weft_time_now_iso(now);
-    json_t *const o =
-        json_pack("{s:s, s:I, s:O, s:o}", "taken", now, "sequence", (json_int_t)run->shooter.frame.sequence,
-                  "retries", retries, "statistics", weft_frame_stats_to_json(&shot->stats));
-    if (o && run->o.average > 1)
-        json_object_set_new(o, "mean_of", json_integer(run->o.average));
-    if (o && frame->bracket >= 0)
-        json_object_set_new(o, "bracket", json_integer(frame->bracket));
-    if (!o || (!frame->lights && !shot->proved))
-        return o;
-    const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
-    json_object_set_new(o, "proof", json_string(shot->proved ? "exposure line" : "controller and picture"));
-    if (shot->proved) {
-        json_object_set_new(o, "rise_tick", json_integer((json_int_t)shot->rise_tick));
-        json_object_set_new(o, "fall_tick", json_integer((json_int_t)shot->fall_tick));
-    }
-    json_object_set_new(o, "lights", json_integer((json_int_t)frame->lights));
-    json_object_set_new(o, "level", json_integer(run->o.level));
-    json_object_set_new(o, "settle_s", json_real(run->o.settle_s));
-    json_object_set_new(o, "on_tick", json_integer((json_int_t)shot->on_tick));
-    json_object_set_new(o, "off_tick", json_integer((json_int_t)shot->off_tick));
-    json_object_set_new(o, "tick_hz", json_integer((json_int_t)info->tick_hz));
-    return o;
-}
-
-static void describe_dng(const capture_run *run, weft_frame_info *info)
-{
-    const weft_camera_state *const camera = weft_camera_get_state(run->shooter.camera);
-    const time_t now = time(NULL);
-    struct tm local;
-    *info = (weft_frame_info){.exposure_s = run->shooter.frame.exposure_s, .gain = run->shooter.frame.gain};
-    snprintf(info->make, sizeof info->make, "%s", camera->vendor);
-    snprintf(info->model, sizeof info->model, "%s", camera->model);
-    snprintf(info->serial, sizeof info->serial, "%s", camera->serial);
-    localtime_r(&now, &local);
-    strftime(info->date_time, sizeof info->date_time, "%Y:%m:%d %H:%M:%S", &local);
-}
-
-/* The camera's own file where it has one, else a DNG. */
-static weft_err write_frame(const capture_run *run, const char *path, weft_error *err)
-{
-    const weft_captured_frame *const frame = &run->shooter.frame;
-    weft_frame_info info;
-    if (frame->file.size > 0)
-        return weft_file_write(path, frame->file.bytes, frame->file.size, err);
-    describe_dng(run, &info);
-    return weft_dng_write(path, &frame->mosaic, &info, err);
-}
-
-/* Writes the file, then its row in set.json: a row's file is always whole. */
-static weft_err keep_frame(capture_run *run, weft_planned_frame *planned, json_t *capture, weft_error *err)
-{
-    weft_set_frame row = {.file = (char *)(uintptr_t)planned->file, /* copied, not changed */
-                          .role = planned->role,
-                          .light = planned->light,
-                          .exposure_s = run->shooter.frame.exposure_s,
-                          .gain = run->shooter.frame.gain,
-                          .capture = capture};
-    char *const path = weft_path_join(run->o.folder, planned->file, err);
-    weft_err status = path ? WEFT_OK : WEFT_ERR_NOMEM;
-    if (status == WEFT_OK)
-        status = write_frame(run, path, err);
-    if (status == WEFT_OK)
-        status = weft_sha256_file(path, row.sha256, err);
-    weft_free(path);
-    WEFT_TRY(status);
-    if (planned->row < 0) {
-        WEFT_TRY(weft_set_add_frame(&run->set, &row, err));
-        planned->row = run->set.n_frames - 1;
-    } else {
-        weft_set_frame *const old = &run->set.frames[planned->row];
-        row.file = old->file;
-        json_decref(old->capture);
-        *old = row;
-    }
-    json_incref(capture); /* the set's own */
-    if (run->o.sidecar)
-        WEFT_TRY(weft_sidecar_write(&run->set, planned->row, err));
-    return weft_set_save(&run->set, err);
-}
-
-/* Writing a frame on another thread. */
-typedef struct keep_job {
-    capture_run *run;
-    weft_planned_frame *frame;
-    json_t *capture;
-    weft_err status;
-    weft_error error;
-} keep_job;
-
-static void *do_keep_job(void *context)
-{
-    keep_job *const job = context;
-    job->status = keep_frame(job->run, job->frame, job->capture, &job->error);
-    return NULL;
-}
-
-/* A disk may take longer than the lease lasts: another thread writes while this one keeps the controller
- * awake.  Nothing else touches the run meanwhile. */
-static weft_err keep_frame_awake(capture_run *run, weft_planned_frame *frame, json_t *capture,
-                                 weft_error *err)
-{
-    keep_job job = {.run = run, .frame = frame, .capture = capture};
-    weft_err awake = WEFT_OK;
-    weft_error sleepy = {0};
-    pthread_t thread;
-    if (pthread_create(&thread, NULL, do_keep_job, &job) != 0)
-        return weft_fail(err, WEFT_ERR_NOMEM, "no thread could be started to write %s", frame->file);
-    for (;;) {
-        struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
-        until.tv_nsec += 100000000;
-        until.tv_sec += until.tv_nsec / 1000000000;
-        until.tv_nsec %= 1000000000;
-        if (pthread_timedjoin_np(thread, NULL, &until) == 0)
-            break;
-        if (awake == WEFT_OK)
-            awake = weft_shooter_keep_alive(&run->shooter, &sleepy);
-    }
-    if (job.status != WEFT_OK) {
-        if (err)
-            *err = job.error;
-        return job.status;
-    }
-    return awake == WEFT_OK ? WEFT_OK : come_back(run, awake, &sleepy, err);
-}
-
-static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_error *err)
+static weft_err take_frame(weft_capture_state *run, weft_planned_frame *frame, weft_error *err)
 {
     weft_shot shot = {0};
     json_t *const retries = json_array();
@@ -463,49 +141,30 @@ static weft_err take_frame(capture_run *run, weft_planned_frame *frame, weft_err
     if (frame->role == WEFT_ROLE_DARK && run->o.cap_lens)
         status = run->o.cap_lens(run->o.context, err);
     if (status == WEFT_OK)
-        status = shoot_mean(run, frame, &shot, retries, err);
-    if (status == WEFT_OK && !(capture = describe_shot(run, frame, &shot, retries)))
+        status = weft_capture_shoot(run, frame, &shot, retries, err);
+    if (status == WEFT_OK && !(capture = weft_capture_describe_shot(run, frame, &shot, retries)))
         status = weft_fail(err, WEFT_ERR_NOMEM, "out of memory for the record of %s", frame->file);
     if (status == WEFT_OK) {
         weft_live_picture_report(frame->file, &run->shooter.frame.mosaic);
-        status = keep_frame_awake(run, frame, capture, err);
+        status = weft_capture_keep(run, frame, capture, err);
     }
     json_decref(capture);
     json_decref(retries);
     WEFT_TRY(status);
     if (frame->role == WEFT_ROLE_AMBIENT)
-        remember_dark_mean(run, &shot);
-    if (frame->role == WEFT_ROLE_LIGHT && frame->middle)
-        run->prints[frame->light] = print_of_frame(run);
-    warn_of_clipping(run, frame, &shot);
+        weft_capture_remember_dark(run, &shot);
+    weft_capture_remember_light(run, frame);
+    weft_capture_warn_of_clipping(run, frame, &shot);
     frame->have = true;
     run->report.n_taken++;
     return WEFT_OK;
 }
 
-/* Of frames from before: a set that is resumed is judged as one that is taken in one go. */
-static weft_err read_prints(capture_run *run, weft_error *err)
+static weft_err take_frames(weft_capture_state *run, weft_error *err)
 {
-    for (int i = 0; i < run->plan.n; i++) {
-        const weft_planned_frame *const f = &run->plan.frames[i];
-        if (!f->have || f->role != WEFT_ROLE_LIGHT || !f->middle)
-            continue;
-        weft_mosaic mosaic;
-        char *const path = weft_set_frame_path(&run->set, f->row, err);
-        const weft_err status = path ? weft_raw_read(path, &mosaic, NULL, err) : WEFT_ERR_NOMEM;
-        weft_free(path);
-        WEFT_TRY(status);
-        run->prints[f->light] = weft_light_print_make(&mosaic, weft_set_frame_time(&run->set.frames[f->row]));
-        weft_mosaic_fini(&mosaic);
-    }
-    return WEFT_OK;
-}
-
-static weft_err take_frames(capture_run *run, weft_error *err)
-{
-    WEFT_TRY(read_prints(run, err));
+    WEFT_TRY(weft_capture_read_prints(run, err));
     if (run->o.no_ambient || run->plan.frames[0].have)
-        WEFT_TRY(look_at_the_dark(run, err));
+        WEFT_TRY(weft_capture_look_at_the_dark(run, err));
     for (int i = 0; i < run->plan.n; i++) {
         if (run->plan.frames[i].have)
             continue;
@@ -517,15 +176,15 @@ static weft_err take_frames(capture_run *run, weft_error *err)
 
 /* ---- the whole ---- */
 
-static weft_err make_plan(capture_run *run, const weft_controller_info *info, const weft_camera_state *camera,
-                          weft_error *err)
+static weft_err make_plan(weft_capture_state *run, const weft_controller_info *info,
+                          const weft_camera_state *camera, weft_error *err)
 {
     const char *const suffix = camera->suffix[0] && run->o.average == 1 ? camera->suffix : ".dng";
     WEFT_TRY(weft_capture_plan_make(&run->o, info->n_lights, &run->set, suffix, &run->plan, err));
     return run->plan.n > 0 ? WEFT_OK : weft_fail(err, WEFT_ERR_USAGE, "no frame is asked for");
 }
 
-static weft_err prepare(capture_run *run, weft_set_found found, weft_error *err)
+static weft_err prepare(weft_capture_state *run, weft_set_found found, weft_error *err)
 {
     const weft_controller_info *const info = weft_controller_get_info(run->shooter.controller);
     const weft_camera_state *const camera = weft_camera_get_state(run->shooter.camera);
@@ -565,7 +224,7 @@ weft_err weft_capture_check_folder(const weft_capture_options *options, weft_err
 }
 
 /* After a failure: what is there, and how to go on. */
-static weft_err tell_what_is_kept(const capture_run *run, weft_err status, weft_error *err)
+static weft_err tell_what_is_kept(const weft_capture_state *run, weft_err status, weft_error *err)
 {
     const int kept = run->report.n_kept + run->report.n_taken;
     if (status == WEFT_ERR_CANCELLED)
@@ -578,7 +237,7 @@ static weft_err tell_what_is_kept(const capture_run *run, weft_err status, weft_
 }
 
 /* What can be said only of the whole, and sidecars that were lost.  set.json comes last: it says complete. */
-static weft_err finish_set(capture_run *run, bool changed, weft_error *err)
+static weft_err finish_set(weft_capture_state *run, bool changed, weft_error *err)
 {
     if (changed && run->report.n_exposures > weft_set_n_lights(&run->set))
         WEFT_TRY(weft_weights_record(&run->set, err));
@@ -591,7 +250,7 @@ static weft_err finish_set(capture_run *run, bool changed, weft_error *err)
     return weft_set_save(&run->set, err);
 }
 
-static weft_err capture(capture_run *run, weft_error *err)
+static weft_err capture(weft_capture_state *run, weft_error *err)
 {
     weft_set_found found;
     WEFT_TRY(weft_set_folder_inspect(&run->o, &found, &run->set, err));
@@ -615,7 +274,7 @@ weft_err weft_capture_run(const weft_capture_options *options, weft_camera_devic
                           weft_capture_report *report, weft_error *err)
 {
     const double start_s = weft_clock_s();
-    capture_run *const run = weft_alloc(1, sizeof *run, err);
+    weft_capture_state *const run = weft_alloc(1, sizeof *run, err);
     if (!run)
         return WEFT_ERR_NOMEM;
     run->o = *options;

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Clipped photosites of one colour that are worth a warning; as capture.c. */
+/* Clipped photosites of one colour that are worth a warning; as good_frame.c. */
 #define CLIPPED_SHARE 0.001
 #define TRIES         3
 /* Shares of the range between which the brightest thousandth is a measure. */
