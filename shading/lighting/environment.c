@@ -45,15 +45,6 @@ weft_environment_share weft_environment_brdf(weft_environment_lobe kind, double 
     return (weft_environment_share){sum[0], sum[1]};
 }
 
-weft_environment_share weft_environment_brdf_quick(weft_environment_lobe kind, double alpha, double nv)
-{
-    lobe in = {kind, alpha};
-    double sum[3] = {0};
-    weft_albedo_integrate_cone(integrand, &in, weft_max(nv, WEFT_ENVIRONMENT_MIN_NV), 0, WEFT_ALBEDO_QUICK,
-                               sum);
-    return (weft_environment_share){sum[0], sum[1]};
-}
-
 /* With u of weft_sample_ggx_cosine() the density of h is uniform; nl > 0 is u < 1/(1 + alpha^2). */
 void weft_environment_prefilter(double roughness, int n, double moments[])
 {

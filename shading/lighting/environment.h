@@ -32,9 +32,6 @@ typedef struct weft_environment_share {
 weft_environment_share weft_environment_brdf(weft_environment_lobe lobe, double alpha, double nv,
                                              double cone_cosine);
 
-/** The same over the whole hemisphere to about 6 digits, in 0.5 ms: for tables. */
-weft_environment_share weft_environment_brdf_quick(weft_environment_lobe lobe, double alpha, double nv);
-
 /** What the specular lobe leaves for the diffuse term: 1 - (F0 scale + bias), `share` entered with n.l for a
  *  direct light (then f = c_diff/pi times it, which is not reciprocal) and n.v for image light.
  *  Source: Chan 2018 pages 77-82; S-COD-21. */

@@ -5,8 +5,8 @@
 #include "core/error.h"
 #include "shading/lighting/environment.h"
 
-/** Nodes along the cube roots of n.v and of alpha, both 0..1: where both are small all changes at once. */
-#define WEFT_ENVIRONMENT_TABLE_SIZE 48
+/** Nodes along the fourth roots of n.v and of alpha: where both are small all changes at once. */
+#define WEFT_ENVIRONMENT_TABLE_SIZE 64
 
 typedef struct weft_environment_table {
     float share[2][WEFT_ENVIRONMENT_TABLE_SIZE]
@@ -14,7 +14,7 @@ typedef struct weft_environment_table {
 } weft_environment_table;
 
 /**
- * Fills the table by deterministic quadrature, spread over the cores: about a second.
+ * Fills the table by deterministic quadrature, spread over the cores: a quarter of a second of core time.
  *
  * Roughness 0 is a mirror: scale 1 - (1 - nv)^5, bias (1 - nv)^5.
  */
@@ -23,12 +23,12 @@ void weft_environment_table_compute(weft_environment_table *table, weft_environm
 /**
  * The same, kept in the user's cache folder ($XDG_CACHE_HOME/weft, else ~/.cache/weft) under the hash of what
  * it depends on; the file ends with the SHA-256 of its numbers, and one that does not fit is computed anew. A
- * folder that cannot be written costs the second each time, nothing else.
+ * folder that cannot be written costs that time each time, nothing else.
  */
 void weft_environment_table_get(weft_environment_table *table, weft_environment_lobe lobe);
 
-/** Bicubic (Catmull-Rom) value, within 5e-4 of the integral for n.v >= WEFT_ENVIRONMENT_MIN_NV and
- *  alpha >= 3.4e-3; within 2.6e-3 where both are near 1e-3. */
+/** Bicubic (Catmull-Rom) value, within 5e-4 of the integral for alpha from 1e-3 (and 6e-4 below it) and every
+ *  n.v, which is raised to WEFT_ENVIRONMENT_MIN_NV. */
 weft_environment_share weft_environment_table_at(const weft_environment_table *table, double nv,
                                                  double alpha);
 

@@ -9,14 +9,19 @@
 #include "shading/lighting/ambient_occlusion.h"
 #include "shading/lighting/area_light.h"
 #include "shading/lighting/environment.h"
+#include "shading/lighting/environment_cone.h"
 #include "shading/lighting/environment_map.h"
 #include "shading/lighting/environment_planes.h"
+#include "shading/lighting/environment_rings.h"
 #include "shading/lighting/environment_table.h"
 #include "shading/lighting/sky.h"
 #include "shading/lighting/volume_light.h"
 
+#include <dirent.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define SEED 20261124u
 
@@ -356,19 +361,103 @@ static void test_environment_table(void **state)
     assert_non_null(mkdtemp(folder));
     assert_int_equal(setenv("XDG_CACHE_HOME", folder, 1), 0);
     weft_environment_table_get(&table, WEFT_ENVIRONMENT_SMITH);
-    for (int i = 0; i < 150; i++) {
-        const double r = between(&random, 0.15, 1), c = between(&random, 0.1, 1);
-        const double alpha = r * r * r, nv = c * c * c;
+    double worst = 0;
+    for (int i = 0; i < 160; i++) { /* the whole domain in decades, half of them where both are small */
+        const double decades = i % 2 ? 3 : 1;
+        const double alpha = 1e-3 * pow(10, between(&random, 0, decades));
+        const double nv = i ? 1e-3 * pow(10, between(&random, 0, decades)) : 1e-3;
         const weft_environment_share wanted = weft_environment_brdf(WEFT_ENVIRONMENT_SMITH, alpha, nv, 0);
         const weft_environment_share got = weft_environment_table_at(&table, nv, alpha);
-        assert_near(got.scale, wanted.scale, 5e-4);
-        assert_near(got.bias, wanted.bias, 5e-4);
+        worst = fmax(worst, fmax(fabs(got.scale - wanted.scale), fabs(got.bias - wanted.bias)));
     }
+    print_message("  environment BRDF: the table is off by %.1e at most\n", worst);
+    assert_near(worst, 0, 5e-4);
     static weft_environment_table again;
     weft_environment_table_get(&again, WEFT_ENVIRONMENT_SMITH); /* from the cache */
     assert_memory_equal(&again, &table, sizeof table);
     check_planes(&table);
     assert_ok(weft_folder_remove(folder, err));
+}
+
+/* The largest difference of the cone table from the integral at places all over its domain. */
+static double cone_table_error(const weft_environment_cone_table *table, weft_environment_lobe lobe)
+{
+    uint64_t random = SEED;
+    double worst = 0;
+    for (int i = 0; i < 120; i++) {
+        const double alpha = 1e-3 * pow(10, between(&random, 0, 3));
+        const double grazing = 1e-3 * pow(10, between(&random, 0, 3)); /* n.v, or what is missing of it */
+        const double nv = i % 2 ? grazing : fmax(1 - 0.999 * grazing * grazing, 1e-3);
+        const double place = i % 10 ? weft_test_random(&random) : 0;
+        const double cone = weft_environment_ring_cosine(alpha, nv, place);
+        const weft_environment_share wanted = weft_environment_brdf(lobe, alpha, nv, cone);
+        const weft_environment_share got = weft_environment_cone_at(table, nv, alpha, cone);
+        assert_near(weft_environment_ring_place(alpha, nv, cone), place, 1e-9);
+        worst = fmax(worst, fmax(fabs(got.scale - wanted.scale), fabs(got.bias - wanted.bias)));
+    }
+    return worst;
+}
+
+static void test_cone_table(void **state)
+{
+    (void)state;
+    static weft_environment_cone_table table, again;
+    char folder[] = "cache-XXXXXX", path[300] = "";
+    assert_non_null(mkdtemp(folder));
+    assert_int_equal(setenv("XDG_CACHE_HOME", folder, 1), 0);
+    for (int lobe = 0; lobe < 2; lobe++) {
+        weft_environment_cone_get(&table, (weft_environment_lobe)lobe);
+        const double worst = cone_table_error(&table, (weft_environment_lobe)lobe);
+        print_message("  environment BRDF above cones: the table is off by %.1e at most\n", worst);
+        assert_near(worst, 0, 5e-4);
+        assert_true(weft_environment_cone_at(&table, 0.3, 0.2, 1).scale == 0);
+    }
+    weft_environment_cone_get(&again, WEFT_ENVIRONMENT_SCHLICK); /* from the cache */
+    assert_memory_equal(&again, &table, sizeof table);
+    /* files that are not whole, or not what they were, are not believed */
+    char name[320];
+    snprintf(name, sizeof name, "%s/weft", folder);
+    DIR *const files = opendir(name);
+    assert_non_null(files);
+    for (const struct dirent *entry; (entry = readdir(files));)
+        if (entry->d_name[0] != '.') {
+            snprintf(path, sizeof path, "%s/weft/%.200s", folder, entry->d_name);
+            FILE *const file = fopen(path, "r+b");
+            assert_non_null(file);
+            assert_int_equal(fseek(file, 1000, SEEK_SET), 0);
+            assert_int_equal(fputs("damaged", file) >= 0, 1);
+            assert_int_equal(fclose(file), 0);
+        }
+    closedir(files);
+    assert_true(path[0]);
+    memset(&again, 0, sizeof again);
+    weft_environment_cone_get(&again, WEFT_ENVIRONMENT_SCHLICK);
+    assert_memory_equal(&again, &table, sizeof table);
+    assert_ok(weft_folder_remove(folder, err));
+}
+
+/* Many cones of one view against one at a time. */
+static void test_rings(void **state)
+{
+    (void)state;
+    enum { N = 32 };
+    uint64_t random = SEED;
+    double worst = 0;
+    for (int i = 0; i < 60; i++) {
+        const weft_environment_lobe lobe = i % 2 ? WEFT_ENVIRONMENT_SMITH : WEFT_ENVIRONMENT_SCHLICK;
+        const double alpha = 1e-4 * pow(10, between(&random, 0, 4));
+        const double nv =
+            i % 3 ? 1e-3 * pow(10, between(&random, 0, 3)) : 1 - pow(10, -between(&random, 1, 6));
+        const int k = (int)between(&random, 0, N - 1);
+        weft_environment_share share[N];
+        weft_environment_rings(lobe, alpha, nv, N, share);
+        const weft_environment_share wanted =
+            weft_environment_brdf(lobe, alpha, nv, weft_environment_ring_cosine(alpha, nv, k / (N - 1.0)));
+        worst = fmax(worst, fmax(fabs(share[k].scale - wanted.scale), fabs(share[k].bias - wanted.bias)));
+        assert_true(share[N - 1].scale == 0 && share[N - 1].bias == 0);
+    }
+    print_message("  rings: off by %.1e at most\n", worst);
+    assert_near(worst, 0, 5e-5);
 }
 
 static void test_occlusion(void **state)
@@ -418,7 +507,9 @@ int main(void)
         cmocka_unit_test(test_prefilter),
         cmocka_unit_test(test_panorama),
         cmocka_unit_test(test_painted_sky),
+        cmocka_unit_test(test_rings),
         cmocka_unit_test(test_environment_table),
+        cmocka_unit_test(test_cone_table),
         cmocka_unit_test(test_occlusion),
         cmocka_unit_test(test_phase_function_integrates_to_one),
     };
