@@ -216,7 +216,8 @@ static void weave_texel(const loom *l, int column, int row, weft_fabric_texel *t
     const double angle =
         (is_warp ? 0.25 * TWO_PI : 0) + (is_warp ? 1 : -1) * 0.4 * twist * (is_warp ? 1 : -1);
     texel->fibre = (uint8_t)((int)lround(angle / (0.5 * TWO_PI) * 256) & 255);
-    if (weave->cover > 0 && fabs(top->across) >= 1)
+    /* The flank of one yarn, drawn down to the ground, may hide the other where that dives under it. */
+    if (weave->cover > 0 && fabs(warp.across) >= 1 && fabs(weft.across) >= 1)
         open_texel(weave, texel);
 }
 

@@ -182,13 +182,80 @@ static void lamps_drift_between_samples(void **state)
     assert_near(sqrt(sum2), 0.01, 0.0007);
 }
 
+/* How far (x, y) is from the crease's line, mm. */
+static double from_crease(double x, double y)
+{
+    const weft_rig_crease *const c = &sample.damage.crease;
+    return (x - (double)c->x) * (double)c->across_x + (y - (double)c->y) * (double)c->across_y;
+}
+
+/* Tears are as large as their formula says and as dark as velvet; the crease leans to both sides as it
+ * should; lint is dark on a light cloth. */
+static void damage_is_what_the_formulas_say(void **state)
+{
+    (void)state;
+    const weft_rig_setup setup = small_setup();
+    weft_rig_truth truth;
+    render(&setup, "plain-weave+flaws");
+    assert_ok(weft_rig_truth_maps(&scene, &view, &sample, &truth, err));
+    const weft_rig_damage *const damage = &sample.damage;
+    const size_t n = (size_t)WIDTH * HEIGHT;
+    double bare_mm2 = 0, tears_mm2 = 0, lean[2] = {0}, albedo[2] = {0}, lit[2] = {0}, flagged[2] = {0};
+    size_t count[2] = {0}, lint = 0;
+    for (int i = 0; i < WEFT_RIG_N_TEARS; i++) /* integral of 2 w (1 - (a / l)^2) */
+        tears_mm2 += 8.0 / 3 * (double)(damage->tears[i].half_width * damage->tears[i].half_length);
+    for (size_t i = 0; i < n; i++) {
+        const double x = (double)view.ground.data[i], y = (double)view.ground.data[n + i];
+        const double d = from_crease(x, y), alpha = (double)truth.alpha.data[i];
+        bare_mm2 += (1 - alpha) * 0.5 * 0.5;
+        if (fabs(d) > 1 && fabs(d) < 2) {
+            lean[d > 0] += (double)truth.normal.data[i] * (double)damage->crease.across_x +
+                           (double)truth.normal.data[n + i] * (double)damage->crease.across_y;
+            count[d > 0]++;
+        }
+        lit[alpha == 0] += (double)frames.light[9][i];
+        flagged[alpha == 0]++;
+        const bool is_lint = truth.flaws.data[i] & WEFT_FLAW_LINT;
+        lint += is_lint;
+        albedo[is_lint] += (double)truth.albedo.data[n + i];
+        assert_true(alpha == 1 || truth.flaws.data[i] & WEFT_FLAW_TEAR);
+    }
+    const double fold = lean[1] / (double)count[1] - lean[0] / (double)count[0];
+    print_message("damage: %.2f mm2 bare, formula %.2f; crease leans by %.3f; %zu px of lint\n", bare_mm2,
+                  tears_mm2, fold, lint);
+    assert_near(bare_mm2 / tears_mm2, 1, 0.05);
+    assert_near(fold, 2 * 0.147, 0.04); /* 0.9 / 4 exp(-1.55 / 4) 1.5 / 1.55 */
+    assert_true(lit[1] / flagged[1] < 0.1 * lit[0] / flagged[0]);
+    assert_true(lint > 60 && albedo[1] / (double)lint < 0.9 * albedo[0] / (double)(n - lint));
+    weft_rig_truth_fini(&truth);
+    clear();
+}
+
+/* Yarns cover 0.45 of their pitch both ways: 1 - 0.55^2 = 0.70, less what their width varies by. */
+static void lace_is_open(void **state)
+{
+    (void)state;
+    const weft_rig_setup setup = small_setup();
+    weft_rig_truth truth;
+    render(&setup, "lace");
+    assert_ok(weft_rig_truth_maps(&scene, &view, &sample, &truth, err));
+    const size_t n = (size_t)WIDTH * HEIGHT;
+    double cover = 0;
+    for (size_t i = 0; i < n; i++)
+        cover += (double)truth.alpha.data[i] / (double)n;
+    print_message("lace: %.3f covered\n", cover);
+    assert_near(cover, 0.685, 0.02);
+    assert_null(truth.flaws.data);
+    weft_rig_truth_fini(&truth);
+    clear();
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bent_sheets_follow_the_formula),
-        cmocka_unit_test(strip_is_white_in_any_scan),
-        cmocka_unit_test(balls_mirror_and_shade),
-        cmocka_unit_test(lamps_drift_between_samples),
+        cmocka_unit_test(bent_sheets_follow_the_formula),  cmocka_unit_test(strip_is_white_in_any_scan),
+        cmocka_unit_test(balls_mirror_and_shade),          cmocka_unit_test(lamps_drift_between_samples),
+        cmocka_unit_test(damage_is_what_the_formulas_say), cmocka_unit_test(lace_is_open),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
