@@ -8,6 +8,7 @@
 
 #include <dirent.h>
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -19,15 +20,25 @@ bool weft_job_writes_nothing_there(const weft_job *job)
     return true;
 }
 
-/* One path of those that it makes. */
-static void sweep_beside(const char *path, int64_t pid)
+/* ".weft-NAME-PID-N" of the process */
+static bool is_left_over(const char *entry, int64_t pid)
 {
-    char *const folder = weft_path_folder(path, NULL);
-    char *const prefix = weft_asprintf(NULL, ".weft-%s-%" PRId64 "-", weft_path_name(path), pid);
-    DIR *const entries = folder && prefix ? opendir(folder) : NULL;
+    char ending[32];
+    const char *const last = strrchr(entry, '-');
+    const int n = snprintf(ending, sizeof ending, "-%" PRId64, pid);
+    return strncmp(entry, ".weft-", 6) == 0 && last && last - entry > n &&
+           strncmp(last - n, ending, (size_t)n) == 0 && last[1] &&
+           strspn(last + 1, "0123456789") == strlen(last + 1);
+}
+
+/* What the process has left in a folder; only_of: with this name, NULL with any. */
+static void sweep_in(const char *folder, const char *only_of, int64_t pid)
+{
+    DIR *const entries = opendir(folder);
     const struct dirent *entry;
     while (entries && (entry = readdir(entries)) != NULL) {
-        if (strncmp(entry->d_name, prefix, strlen(prefix)) != 0)
+        if (!is_left_over(entry->d_name, pid) ||
+            (only_of && strncmp(entry->d_name + 6, only_of, strlen(only_of)) != 0))
             continue;
         char *const left = weft_path_join(folder, entry->d_name, NULL);
         if (left && unlink(left) != 0 && weft_folder_remove(left, NULL) != WEFT_OK)
@@ -36,14 +47,19 @@ static void sweep_beside(const char *path, int64_t pid)
     }
     if (entries)
         closedir(entries);
-    weft_free(prefix);
-    weft_free(folder);
 }
 
 void weft_job_sweep(const weft_job *job, int64_t pid)
 {
-    for (size_t i = 0; i < json_array_size(job->writes) && pid > 0; i++)
-        sweep_beside(json_string_value(json_array_get(job->writes, i)), pid);
+    for (size_t i = 0; i < json_array_size(job->writes) && pid > 0; i++) {
+        const char *const path = json_string_value(json_array_get(job->writes, i));
+        char *const folder = weft_path_folder(path, NULL);
+        if (folder)
+            sweep_in(folder, weft_path_name(path), pid);
+        if (weft_folder_exists(path)) /* a material is built file by file */
+            sweep_in(path, NULL, pid);
+        weft_free(folder);
+    }
 }
 
 /* Whether the set that the job writes was begun by it: times are text that sorts. */

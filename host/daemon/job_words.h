@@ -11,7 +11,7 @@
 bool weft_job_writes_nothing_there(const weft_job *job);
 
 /** Removes what a process of the job that was killed has left half made: ".weft-NAME-PID-N" beside what it
- * makes. */
+ * makes and, where that is a folder, in it. */
 void weft_job_sweep(const weft_job *job, int64_t pid);
 
 /**

@@ -122,6 +122,34 @@ def test_cancelled_bake_goes_on():
                 assert filecmp.cmp(f"{d.library}/whole.material/{name}", f"{d.library}/big{i}.material/{name}", False), name
 
 
+def test_killed_bake_leaves_nothing():
+    """What a killed process has begun to write is removed, in the material too; what is another's stays."""
+    with scratch() as folder, Weftd(folder) as d:
+        make_flat(f"{d.library}/flat", 200, 150)
+        write(f"{d.library}/big.radattr", 'include <cotton.radattr>\n:big := ( cotton :scan = "flat.maps" )\n')
+        assert d.run("import", "flat", output="flat.set")["state"] == "done"
+        assert d.run("solve", "flat.set", calibration="flat.cal", output="flat.maps")["state"] == "done"
+        for i in range(8):  # until one is caught at work
+            made = f"{d.library}/big{i}.material"
+            bake = d.add("bake", "big.radattr", output=f"big{i}.material", size="512x384")
+            while not os.path.isdir(made):
+                time.sleep(0.002)
+            for pid in children(d.process.pid):
+                mine = [f"{made}/.weft-normal.exr-{pid}-3", f"{d.library}/.weft-big{i}.material-{pid}-0"]
+                others = [f"{made}/.weft-normal.exr-{pid}1-3", f"{made}/.weft-normal.exr-{pid}-x",
+                          f"{d.library}/.weft-other.set-{pid}-0"]
+                for path in mine + others:
+                    write(path, "half")
+                os.kill(pid, signal.SIGKILL)
+            ended = d.wait(bake)
+            if ended["state"] == "failed":
+                break
+        assert ended["state"] == "failed" and "signal 9" in ended["error"], ended
+        assert not any(os.path.exists(path) for path in mine) and all(os.path.exists(path) for path in others)
+        assert d.post(f"/v1/jobs/{bake}/resume").status == 202
+        assert d.wait(bake)["state"] == "done"
+
+
 def test_batch():
     """Many sets as one job: its progress, what it makes one by one in the library; a cancelled one goes on."""
     with scratch() as folder, Weftd(folder) as d:
