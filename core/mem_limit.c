@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 enum { MOST_BLOCKS = 2048 };
@@ -30,6 +31,7 @@ static struct {
     pthread_mutex_t lock;
     double limit, heap, files; /* bytes */
     int n, n_files;
+    bool watched;
     block blocks[MOST_BLOCKS];
 } known = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
@@ -94,6 +96,32 @@ void weft_mem_trim(void)
         weft_mem_give_back();
 }
 
+/* Serial work on large blocks that does not trim by itself: looks every 2 ms, as long as blocks are in files.
+ */
+static void *watch(void *unused)
+{
+    static const struct timespec pause = {.tv_nsec = 2000000};
+    bool going = true;
+    while (going) {
+        weft_mem_trim();
+        nanosleep(&pause, NULL);
+        pthread_mutex_lock(&known.lock);
+        going = known.watched = known.n_files > 0;
+        pthread_mutex_unlock(&known.lock);
+    }
+    return unused;
+}
+
+/* The lock is held.  Without a thread the bands still trim. */
+static void begin_watch(void)
+{
+    pthread_t thread;
+    if (!known.watched && pthread_create(&thread, NULL, watch, NULL) == 0) {
+        pthread_detach(thread);
+        known.watched = true;
+    }
+}
+
 /* ---- blocks ---- */
 
 /* An eighth is kept free for what is not counted. */
@@ -126,6 +154,8 @@ static bool note(void *at, size_t bytes, bool in_file)
     known.files += in_file ? (double)bytes : 0;
     atomic_store(&n_known, known.n);
     atomic_store(&n_in_files, known.n_files);
+    if (in_file)
+        begin_watch();
     return true;
 }
 

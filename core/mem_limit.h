@@ -8,7 +8,8 @@
  * touched again.  So the pieces are the bands that pass through memory, as many rows as the limit allows;
  * what is computed does not depend on it.
  *
- * weft_parallel_rows() calls weft_mem_trim() after each band; a serial loop over large blocks does so itself.
+ * weft_parallel_rows() calls weft_mem_trim() after each band, and serial loops over large blocks do after
+ * each row; a thread that looks every 2 ms is there for those that do not.
  *
  * The files lie in $TMPDIR, else in /var/tmp; their room is reserved when the block is made, so that a full
  * disk is an error and no crash.
