@@ -329,12 +329,12 @@ static weft_err average_level(weft_baked *baked, weft_baked_kind kind, int level
     return WEFT_OK;
 }
 
-static weft_err spread_roughness(weft_baked *baked, weft_error *err)
+static weft_err spread_roughness(weft_baked *baked, weft_baked_kind kind, weft_error *err)
 {
-    weft_baked_map *const map = &baked->maps[WEFT_BAKED_ROUGHNESS];
+    weft_baked_map *const map = &baked->maps[kind];
     if (map->n_mips > 0)
         return WEFT_OK;
-    WEFT_TRY(weft_baked_add(baked, WEFT_BAKED_ROUGHNESS, baked->width, baked->height, err));
+    WEFT_TRY(weft_baked_add(baked, kind, baked->width, baked->height, err));
     for (size_t i = 0; i < weft_image_plane_size(&map->mips[0]); i++)
         map->mips[0].data[i] = map->constant[0];
     return WEFT_OK;
@@ -357,22 +357,36 @@ static bool is_filtered(const weft_baked *baked, weft_baked_kind kind)
            kind == WEFT_BAKED_NORMAL_LENGTH || kind == WEFT_BAKED_ROUGHNESS;
 }
 
-static void swap_lobes(weft_baked *baked)
+/*
+ * The cloth part's roughness where two lobes lie side by side: alpha^2 + 2/kappa (S-ORD-22) from the length
+ * of the averaged normal.  Its distribution is no GGX, which the other rules are about; and this one costs
+ * next to nothing.
+ */
+static weft_err filter_cloth(weft_baked *baked, int levels, const weft_mip_options *options, weft_error *err)
 {
-    const weft_baked_map cloth = baked->maps[WEFT_BAKED_CLOTH_ROUGHNESS];
-    baked->maps[WEFT_BAKED_CLOTH_ROUGHNESS] = baked->maps[WEFT_BAKED_ROUGHNESS];
-    baked->maps[WEFT_BAKED_ROUGHNESS] = cloth;
-}
-
-/* The cloth part's roughness answers for the same normals as that of the GGX part. */
-static weft_err filter_cloth(weft_baked *baked, int levels, const weft_mip_options *options, float *scratch,
-                             weft_error *err)
-{
-    swap_lobes(baked);
-    weft_err status = spread_roughness(baked, err);
-    for (int level = 1; level < levels && status == WEFT_OK; level++)
-        status = filter_level(baked, level, options, scratch, err);
-    swap_lobes(baked);
+    weft_baked_map *const map = &baked->maps[WEFT_BAKED_CLOTH_ROUGHNESS];
+    const bool widens = options->rule != WEFT_MIP_NONE;
+    weft_image source;
+    WEFT_TRY(spread_roughness(baked, WEFT_BAKED_CLOTH_ROUGHNESS, err));
+    WEFT_TRY(weft_image_copy(&source, &map->mips[0], err));
+    for (size_t i = 0; widens && i < weft_image_plane_size(&source); i++)
+        source.data[i] *= source.data[i];
+    weft_err status = WEFT_OK;
+    for (int level = 1; level < levels && status == WEFT_OK; level++) {
+        status = begin_level(baked, WEFT_BAKED_CLOTH_ROUGHNESS, level, err);
+        if (status != WEFT_OK)
+            break;
+        const float *const lengths = baked->maps[WEFT_BAKED_NORMAL_LENGTH].mips[level].data;
+        weft_image *const to = &map->mips[level];
+        mean_job job = {&source, to};
+        weft_parallel_rows(to->height, mean_rows, &job);
+        for (size_t i = 0; widens && i < weft_image_plane_size(to); i++) {
+            const double alpha = sqrt((double)to->data[i]),
+                         kappa = weft_vmf_kappa(fmin((double)lengths[i], 1));
+            to->data[i] = (float)fmin(weft_vmf_roughness(alpha, kappa, WEFT_VMF_CONSISTENT), 1);
+        }
+    }
+    weft_image_fini(&source);
     return status;
 }
 
@@ -403,7 +417,7 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
     if (!scratch)
         return WEFT_ERR_NOMEM;
     weft_err status = WEFT_OK;
-    if (bumpy && (status = spread_roughness(baked, err)) == WEFT_OK &&
+    if (bumpy && (status = spread_roughness(baked, WEFT_BAKED_ROUGHNESS, err)) == WEFT_OK &&
         (status = weft_baked_add(baked, WEFT_BAKED_NORMAL_LENGTH, baked->width, baked->height, err)) ==
             WEFT_OK)
         for (size_t i = 0; i < weft_image_plane_size(&baked->maps[WEFT_BAKED_NORMAL_LENGTH].mips[0]); i++)
@@ -417,7 +431,7 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
             status = filter_level(baked, level, options, scratch, err);
     }
     if (status == WEFT_OK && bumpy && baked->two_lobes)
-        status = filter_cloth(baked, levels, options, scratch, err);
+        status = filter_cloth(baked, levels, options, err);
     for (int k = 0; k < WEFT_BAKED_COUNT && status == WEFT_OK; k++)
         if (baked->maps[k].n_mips > 0)
             baked->maps[k].n_mips = levels;

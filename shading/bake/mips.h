@@ -46,7 +46,8 @@ weft_mip_options weft_mip_defaults(void);
 /**
  * Fills the levels of every map that has a level 0; level 0 itself stays as it is (its normals describe
  * facets, S-COD-05).  A constant roughness becomes a map when the normals vary.  Adds
- * WEFT_BAKED_NORMAL_LENGTH.
+ * WEFT_BAKED_NORMAL_LENGTH.  Where GGX and cloth lie side by side the cloth's roughness is widened by
+ * alpha^2 + 2/kappa, whatever the rule (none but for WEFT_MIP_NONE).
  * @return WEFT_ERR_NOMEM, WEFT_ERR_CANCELLED
  */
 weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft_error *err);
