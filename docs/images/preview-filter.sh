@@ -10,7 +10,7 @@ cd "$work"
 "$weft" weave "$maps" -o tile.maps >/dev/null
 echo ':twill := ( opaquematerial :scan = "tile.maps" :specular_roughness = 0.2 :specular_intensity = 0.1 )' >twill.radattr
 "$weft" bake twill.radattr -o twill.material --size 1024x652 --periodic >/dev/null
-look=("$weft" preview twill.material --brdf ggx --shape sphere --repeat 5 --size 240x240 --light 120,40)
+look=("$weft" preview twill.material --brdf ggx --shape sphere --repeat 5 --size 240x240 --light "120,40")
 "${look[@]}" -o unfiltered.png --filter samples --draft >/dev/null
 "${look[@]}" -o filtered.png --draft >/dev/null
 "${look[@]}" -o every.png --filter samples >/dev/null

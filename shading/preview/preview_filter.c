@@ -225,8 +225,7 @@ void weft_preview_fetch_filtered(const weft_preview_setup *setup, weft_preview_s
     find_footprints(setup, s, &f);
     for (int i = 0; i < s->n; i++)
         most = (int)f.taps[i] > most ? (int)f.taps[i] : most;
-    for (int block = 0; block < t->stride / 8; block++)
-        memset(sums[block], 0, sizeof sums[block]);
+    memset(sums, 0, sizeof sums);
     for (int tap = 0; tap < most; tap++) {
         place_taps(setup, s, &f, tap, &l);
         for (int block = 0; block < t->stride / 8; block++)

@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "shading/preview/preview.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -83,13 +84,14 @@ static void pack_rows(void *context, int band, int row_begin, int row_end)
 weft_err weft_preview_texture_init(weft_preview_texture *texture, const weft_preview_surface *surface,
                                    int first, weft_error *err)
 {
-    source from;
+    source from = {0};
     size_t total = 0;
     *texture = (weft_preview_texture){.levels = weft_preview_surface_levels(surface)};
     if (texture->levels == 0)
         return WEFT_OK;
     texture->first = first < 0 ? 0 : first < texture->levels ? first : texture->levels - 1;
     list_channels(texture, &from, surface);
+    assert(from.chain[0]);
     for (int l = texture->first; l < texture->levels; l++) {
         texture->width[l] = from.chain[0][l].width;
         texture->height[l] = from.chain[0][l].height;
