@@ -1,31 +1,68 @@
 /* Lint: what is darker or brighter than the cloth and too thin for a yarn. */
+#include "core/parallel.h"
+#include "core/progress.h"
 #include "host/solve/flaw_search.h"
 #include "host/solve/running_mean.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Thinner than this is lint, thicker a yarn. */
 static const double lint_mm = 0.5;
 /* Least contrast, relative to the cloth around, and in units of what the cloth itself has. */
 static const float lint_contrast = 0.12F, lint_usual = 3;
 
-/* Least (sign 1) or greatest (-1) value within `reach` along a line of n pixels that are `step` apart. */
-static void reach_line(const float *from, int n, size_t step, int reach, float sign, float *to)
+/* Least (sign 1) or greatest (-1) of the neighbours: along the rows from `from` to `between`, then across
+ * them to `to`; whole rows at a time, so that memory is read in order. */
+typedef struct reach_job {
+    const weft_image *from;
+    weft_image *to;
+    int reach;
+    float sign;
+} reach_job;
+
+static void lower(float *restrict to, const float *restrict from, float sign, int n)
 {
     for (int i = 0; i < n; i++) {
-        float least = INFINITY;
-        for (int k = i - reach < 0 ? 0 : i - reach; k <= i + reach && k < n; k++)
-            least = fminf(least, sign * from[(size_t)k * step]);
-        to[(size_t)i * step] = sign * least;
+        const float x = sign * from[i], now = sign * to[i];
+        to[i] = sign * (x < now ? x : now);
+    }
+}
+
+static void reach_along(void *context, int band, int row_begin, int row_end)
+{
+    const reach_job *const job = context;
+    const int w = job->from->width;
+    (void)band;
+    for (int v = row_begin; v < row_end; v++) {
+        const float *const from = weft_image_row(job->from, 0, v);
+        float *const to = weft_image_row(job->to, 0, v);
+        memcpy(to, from, (size_t)w * sizeof *to);
+        for (int k = 1; k <= job->reach && k < w; k++) {
+            lower(to, from + k, job->sign, w - k);
+            lower(to + k, from, job->sign, w - k);
+        }
+    }
+}
+
+static void reach_across(void *context, int band, int row_begin, int row_end)
+{
+    const reach_job *const job = context;
+    const int w = job->from->width, h = job->from->height;
+    (void)band;
+    for (int v = row_begin; v < row_end; v++) {
+        float *const to = weft_image_row(job->to, 0, v);
+        memcpy(to, weft_image_row(job->from, 0, v), (size_t)w * sizeof *to);
+        for (int k = v - job->reach < 0 ? 0 : v - job->reach; k <= v + job->reach && k < h; k++)
+            lower(to, weft_image_row(job->from, 0, k), job->sign, w);
     }
 }
 
 static void reach_square(const weft_image *from, int reach, float sign, weft_image *between, weft_image *to)
 {
-    for (int v = 0; v < from->height; v++)
-        reach_line(weft_image_row(from, 0, v), from->width, 1, reach, sign, weft_image_row(between, 0, v));
-    for (int u = 0; u < from->width; u++)
-        reach_line(between->data + u, from->height, (size_t)from->width, reach, sign, to->data + u);
+    reach_job along = {from, between, reach, sign}, across = {between, to, reach, sign};
+    weft_parallel_rows(from->height, reach_along, &along);
+    weft_parallel_rows(from->height, reach_across, &across);
 }
 
 /* One colour, and how much of the surroundings is cloth. */
@@ -60,6 +97,8 @@ static weft_err find_contrast(const weft_flaw_search *s, float sign, lint_images
     const int reach = (int)fmax(2, round(lint_mm / 2 / s->maps->mm_per_px));
     const size_t n = weft_image_plane_size(contrast);
     for (int c = 0; c < 3; c++) {
+        if (weft_cancelled())
+            return weft_fail(err, WEFT_ERR_CANCELLED, "cancelled");
         fill_colour(s, c, &im->colour, &im->around);
         WEFT_TRY(weft_running_mean(&im->around, 4 * reach, 1, err));
         reach_square(&im->colour, reach, sign, &im->between, &im->opened);

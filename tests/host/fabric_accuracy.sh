@@ -38,7 +38,7 @@ for seed in $seeds; do
         for sample in $samples; do
             for method in lsq robust; do
                 for geometry in ${WEFT_FABRIC_GEOMETRIES:-sensor}; do
-                    "$weft" solve "$sample.set" -c s.cal -o m.maps --method $method --geometry $geometry \
+                    "$weft" solve "$sample.set" -c s.cal -o m.maps --method $method --geometry "$geometry" \
                         --mm-per-px "$mm" --force -q >/dev/null
                     "$weft" compare m.maps "$sample.truth/$geometry.maps" --json |
                         python3 -c "
