@@ -142,6 +142,10 @@ def test_text_options_of_jobs():
     with scratch() as folder, Weftd(folder) as d:
         commands = {c["command"]: c for c in d.get("/v1/commands").json["commands"]}
         assert set(commands) == set(rows), set(commands) ^ set(rows)
+        with open(f"{SOURCE}/docs/daemon.md", encoding="utf-8") as page:
+            told = page.read().split("These commands can be jobs:")[1].split("\n")[0]
+        for name in commands:
+            assert f"`{name}`" in told or f"`{name.split()[0]} ...`" in told, f"docs/daemon.md: {name} can be a job too"
         for name, command in commands.items():
             known = {"rig", "port", "camera"}
             for words in re.findall(r'\.(?:reads|writes|texts) = "([^"]*)"', rows[name]):

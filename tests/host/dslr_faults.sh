@@ -10,9 +10,10 @@ export HOME=$dir
 export WEFT_CAMERA_PATIENCE=1
 capture=("$weft" capture --rig "$dir/rig" --camera gphoto -q)
 
-# The fault comes when the first frame is there.
-# begin NAME FAULT: takes a set, which is cut short or not; its exit status is in $status, its words in $dir/err
+# begin NAME FAULT: takes a set and orders the fault when its first frame is there.  Its exit status is in $status,
+# its words are in $dir/err.
 begin() {
+    rm -rf "$dir/$1.set"
     "${capture[@]}" "$dir/$1.set" --exposure 0.04 --lights 0,1,2,3 >"$dir/out" 2>"$dir/err" 9>&- &
     local pid=$!
     until [ -e "$dir/$1.set/ambient.nef" ] || ! kill -0 $pid 2>/dev/null; do sleep 0.02; done
@@ -43,6 +44,14 @@ goes_on() {
     echo "ok    $1"
 }
 
+# until_caught NAME FAULT: the same, again when the fault came too late, behind the last frame
+until_caught() {
+    for _ in 1 2 3 4; do
+        begin "$1" "$2"
+        if [ "$status" != 0 ] || jq -e '[.frames[].capture.retries[]] != []' "$dir/$1.set/set.json" >/dev/null; then break; fi
+    done
+}
+
 # stopped NAME WORDS: the capture failed, and said so
 stopped() {
     [ "$status" = 1 ] || fail "$1: exit $status"
@@ -59,12 +68,12 @@ survived() {
 start_rig
 
 if [ -n "${WEFT_ALL_FAULTS:-}" ]; then # five helpers are given up one after the other
-    begin busy-60-s "fault stuck 60"
+    until_caught busy-60-s "fault stuck 60"
     stopped busy-60-s "did not answer in time"
     goes_on busy-60-s
 fi
 
-begin io-error "fault line 1"
+until_caught io-error "fault line 1"
 survived io-error "the line to the camera broke"
 goes_on io-error
 
@@ -73,7 +82,7 @@ begin raw-and-jpeg "turn 0x5004 5"
 [ -z "$(find "$dir/raw-and-jpeg.set" -iname '*.jp*g')" ] || fail "raw-and-jpeg: a JPEG is in the set"
 goes_on raw-and-jpeg
 
-begin card-full "fault card-full 1"
+until_caught card-full "fault card-full 1"
 stopped card-full "there is no room"
 goes_on card-full
 
