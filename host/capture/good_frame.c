@@ -178,8 +178,9 @@ void weft_capture_warn_of_clipping(weft_capture_state *run, const weft_planned_f
     const double share = weft_frame_stats_clipped(&shot->stats, &colour);
     if (!frame->shortest || share <= CLIPPED_SHARE)
         return;
-    weft_warn("%s: %.1f %% of the %s pixels are clipped at %g s; give a shorter --exposure, or --bracket auto",
-              frame->file, 100 * share, colour, run->shooter.frame.exposure_s);
+    weft_warn(
+        "%s: %.1f %% of the %s pixels are clipped at %g s; give a shorter --exposure, or --bracket auto",
+        frame->file, 100 * share, colour, run->shooter.frame.exposure_s);
     run->report.n_warnings++;
 }
 

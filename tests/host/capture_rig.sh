@@ -65,6 +65,7 @@ expect 1 "/proc/weft" "${capture[@]}" /proc/weft/x.set --exposure 0.04
 mkdir "$dir/small"
 if mount -t tmpfs -o size=2m none "$dir/small" 2>/dev/null; then
     expect 1 "small/x.set: the disk has 2 MB free and 11 frames need" "${capture[@]}" "$dir/small/x.set" --exposure 0.04
+    expect 1 "31 frames need" "${capture[@]}" "$dir/small/x.set" --exposure 0.04 --bracket 3
     [ ! -e "$dir/small/x.set" ] || fail "full disk: something was begun"
     mount -o remount,size=12m "$dir/small"
     "${capture[@]}" "$dir/small/y.set" --exposure 0.3 2>"$dir/err" 9>&- &

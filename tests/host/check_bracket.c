@@ -126,7 +126,8 @@ static worth judge(const weft_plate *plate, const weft_plate *used, const double
             continue;
         }
         for (int k = 0; k < n_times; k++)
-            if (!used[k].clipped.data[i] && (k + 1 == n_times || x * times[k] < WEFT_BRACKET_LIMIT))
+            if (!(used[k].clipped.data && used[k].clipped.data[i]) &&
+                (k + 1 == n_times || x * times[k] < WEFT_BRACKET_LIMIT))
                 information += 1 / variance(x, times[k], mean_of);
         n++;
         light += x;
@@ -149,6 +150,7 @@ static worth judge_light(const weft_set *set, int light, const double *times, in
                          const char *what)
 {
     weft_plate plate, used[3];
+    memset(used, 0, sizeof used);
     assert_ok(weft_plate_load_light(set, light, NULL, &plate, err));
     for (int i = 0; i < set->n_frames; i++)
         for (int k = 0; k < n_times; k++)
@@ -240,18 +242,24 @@ static void a_bracket_of_means(void **state)
     weft_set_fini(&set);
 }
 
+enum { STEPS = 12 };
+
+static int step_of(int i)
+{
+    return i / WIDTH * STEPS / HEIGHT;
+}
+
 /* Which values count must not depend on their own noise: grey steps about the limit, each must keep its mean.
  */
 static void no_bias_where_values_cease_to_count(void **state)
 {
     (void)state;
-    enum { STEPS = 12 };
     const double times[] = {1, 0.25, 0.0625};
     float *const light = frames.light[LIGHT], *const room = frames.room;
     frames.light[LIGHT] = weft_alloc(N, sizeof *light, NULL);
     frames.room = weft_alloc(N, sizeof *room, NULL);
     for (int i = 0; i < N; i++)
-        frames.light[LIGHT][i] = 0.87F + 0.012F * (float)(i / WIDTH * STEPS / HEIGHT);
+        frames.light[LIGHT][i] = 0.87F + 0.012F * (float)step_of(i);
     weft_set set = make_set("steps.set");
     for (int k = 0; k < 3; k++)
         shoot(&set, 0, times[k], 1);
@@ -259,7 +267,7 @@ static void no_bias_where_values_cease_to_count(void **state)
     double sum[STEPS] = {0}, n[STEPS] = {0}, worst = 0;
     assert_ok(weft_plate_load_light(&set, 0, NULL, &plate, err));
     for (int i = 0; i < N; i++) {
-        const int step = i / WIDTH * STEPS / HEIGHT;
+        const int step = step_of(i);
         sum[step] += (double)plate.image.data[i] / truth(i) - 1;
         n[step]++;
     }

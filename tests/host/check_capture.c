@@ -228,7 +228,19 @@ static void test_a_bracket(void **state)
     assert_int_equal(set.frames[7].role, WEFT_ROLE_ALL);
     assert_int_equal(bench.lit_before_end[7], 0x3ff);
     assert_int_equal(report.n_warnings, 1); /* all on clips; the long end of the bracket may */
+    /* a set of a program that knew no exposures of single lights: its brackets go by their names */
+    json_t *const begun = json_object_get(set.other, "capture");
+    const char *const newer[] = {"exposures_s", "brackets", "file_name", "sidecar"};
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(json_object_del(begun, newer[i]), 0);
+    for (int i = 1; i < 7; i++)
+        assert_int_equal(json_object_del(set.frames[i].capture, "bracket"), 0);
+    set.complete = false;
+    assert_ok(weft_set_save(&set, err));
     weft_set_fini(&set);
+    const weft_capture_options old = {.folder = options.folder, .resume = true};
+    run_well(&old, &report);
+    assert_true(report.n_kept == 8 && report.n_taken == 0);
     weft_capture_options wide = options;
     wide.folder = weft_test_path("wide.set");
     wide.bracket = 9;
