@@ -43,7 +43,7 @@ void weft_mem_set_limit(double bytes)
 {
     pthread_mutex_lock(&known.lock);
     known.limit = bytes > 0 ? bytes : 0;
-    atomic_store(&trim_above, known.limit - 0.1 * known.limit - 8.0 * 1048576);
+    atomic_store(&trim_above, 0.85 * known.limit - 8.0 * 1048576);
     pthread_mutex_unlock(&known.lock);
     if (bytes > 0)
         mallopt(M_MMAP_THRESHOLD, (int)large); /* large blocks go back to the system when they are freed */
