@@ -445,7 +445,7 @@ static weft_err look_at_input(const weft_invocation *inv, const preview_args *a,
         status = weft_preview_input_level(&input, texels_per_px(a, &input.surface, size), err);
     if (status == WEFT_OK && a->self_shadow)
         status = weft_preview_input_height(&input, folder, a->height_map, err);
-    if (status == WEFT_OK && a->sweep) { /* once for all pictures */
+    if (status == WEFT_OK && is_sequence(a)) { /* once for all pictures */
         status = weft_preview_pack(&input.surface, view, &input.texture, err);
         input.surface.texture = &input.texture;
     }
