@@ -65,6 +65,8 @@ model_page unreal roughness=0.1,0.3,0.5,0.7,1
 model_page disney sheen=0,0.25,0.5,0.75,1 --param base=0.4,0.1,0.1
 model_page cloth $alphas --param f0=0.2
 model_page cloth-two-tone $alphas --param f0=0.3 --param rim=1,0.6,0.3
+model_page ggx-cloth cloth=0,0.25,0.5,0.75,1 --param albedo=0.05 --param f0=0.08 --param alpha=0.1 \
+    --param cloth_albedo=0.3,0.05,0.05 --param cloth_f0=0.2
 model_page charlie alpha=0.1,0.2,0.4,0.7,1
 mv index.new README.md
 

@@ -130,6 +130,9 @@ static weft_err load_material(weft_preview_input *input, const char *folder, con
 {
     WEFT_TRY(weft_material_load(folder, &input->baked, err));
     WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
+    if (input->baked.two_lobes && strcmp(input->surface.brdf->name, weft_baked_brdf(&input->baked)) != 0)
+        weft_warn("%s: GGX and cloth lie side by side; --brdf %s shows both, %s the smooth part alone",
+                  folder, weft_baked_brdf(&input->baked), input->surface.brdf->name);
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     return use_level(input, 0, err);
 }
