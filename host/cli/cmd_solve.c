@@ -333,6 +333,14 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
                                   .shadow = args->shadow};
     weft_mem_set_limit(options.memory_bytes);
     WEFT_TRY(weft_solve_find_method(args->method, &options.method, err));
+    const char *const needs_plane = args->flaws            ? "--flaws"
+                                    : args->ground > 0     ? "--ground"
+                                    : args->flatten_mm > 0 ? "--flatten"
+                                    : args->height         ? "--height"
+                                                           : NULL;
+    if (needs_plane && options.sensor_geometry)
+        return weft_fail(err, WEFT_ERR_USAGE, "%s is for maps of the plane, not for --geometry sensor",
+                         needs_plane);
     if (args->explain.n > 0 && inv->n_operands > 1)
         return weft_fail(err, WEFT_ERR_USAGE, "--explain is for one set");
     if (args->explain.n > 0)

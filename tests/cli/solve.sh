@@ -78,6 +78,15 @@ expect 1 'absent.cal' "$weft" solve flat.set -c absent.cal -o x
 expect 1 'absent.set' "$weft" solve absent.set -c flat.cal -o x
 expect 1 'there is no folder nowhere' "$weft" solve flat.set -c flat.cal -o nowhere/x
 expect 1 'weft calibrate lens' "$weft" solve flat.set -c flat.cal -o x --geometry plane
+# what needs pixels that are millimetres: known before the work with --geometry sensor, after it without a camera
+for option in --flaws "--ground 0.02" "--height poisson" "--flatten 20"; do
+    # shellcheck disable=SC2086 # an option and its value
+    expect 2 "${option%% *} is for maps of the plane" "$weft" solve flat.set -c flat.cal -o x --geometry sensor $option
+    # shellcheck disable=SC2086
+    expect 1 "${option%% *} needs maps of the plane" "$weft" solve flat.set -c flat.cal -o x $option
+done
+test ! -e x
+expect 2 '--ground' "$weft" solve flat.set -c flat.cal -o x --ground 0.5
 # one pixel explained
 expect 0 '5 of 5 lights' "$weft" solve flat.set -c flat.cal --explain 16,12 --explain-plot pixel.svg
 expect 1 'pixel.svg' "$weft" solve flat.set -c flat.cal --explain 16,12 --explain-plot pixel.svg
