@@ -39,6 +39,15 @@ WEFT_INLINE void interpolate_nodes(const weft_incidence *inc, int step_log2, int
 WEFT_INLINE void expand(const block_nodes *nodes, int step_log2, int plane, float to[LANES])
 {
     const int step = 1 << step_log2;
+    if (step_log2 ==
+        3) { /* both cells in one vector: two halves would have to be put together by the memory */
+        const float a0 = nodes->at[0][plane], d0 = nodes->at[1][plane] - a0;
+        const float a1 = nodes->at[1][plane], d1 = nodes->at[2][plane] - a1;
+#pragma omp simd
+        for (int k = 0; k < LANES; k++)
+            to[k] = k < 8 ? a0 + nodes->part[k] * d0 : a1 + (nodes->part[k] - 1) * d1;
+        return;
+    }
     for (int i = 0; i < LANES >> step_log2; i++) {
         const float a = nodes->at[i][plane], d = nodes->at[i + 1][plane] - a;
 #pragma omp simd
@@ -257,6 +266,8 @@ WEFT_CLONES static void gather(const weft_solve_plan *plan, int row, int block, 
 {
     if (plan->incidence->step_log2 == 4)
         gather_with_step(plan, 4, row, block, in, with_view, nodes, s);
+    else if (plan->incidence->step_log2 == 3) /* half size, and cameras of a megapixel */
+        gather_with_step(plan, 3, row, block, in, with_view, nodes, s);
     else
         gather_with_step(plan, plan->incidence->step_log2, row, block, in, with_view, nodes, s);
 }

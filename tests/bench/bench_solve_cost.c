@@ -129,6 +129,6 @@ int main(int argc, char **argv)
     if (argc > 1)
         failed |= draw(&number, "1 megapixel", "lights", argv[1], "solve-cost-lights.svg", 0, SEARCH - 1, 0) |
                   draw(&number, "1 megapixel", "lights", argv[1], "search-cost-lights.svg", SEARCH, SEARCH,
-                       ALL_TRIPLES);
+                       ALL_TRIPLES + 1);
     return failed;
 }
