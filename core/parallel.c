@@ -5,6 +5,8 @@
 
 #include <omp.h>
 
+#define ENOUGH_S 0.05 /* between two looks at progress and cancelling */
+
 void weft_parallel_set_threads(int n)
 {
     omp_set_num_threads(n > 0 ? n : omp_get_num_procs());
@@ -30,13 +32,16 @@ weft_err weft_parallel_rows_progress(int n_rows, weft_rows_fn *fn, void *context
                                      weft_error *err)
 {
     const int n_bands = weft_parallel_n_bands(n_rows);
-    const int step = 2 * omp_get_max_threads();
+    int step = 2 * omp_get_max_threads();
     weft_progress progress;
     weft_err status = WEFT_OK;
     weft_progress_begin(&progress, what, "rows", n_rows);
-    for (int band = 0; band < n_bands && status == WEFT_OK; band += step) {
-        const int last = band + step < n_bands ? band + step : n_bands;
+    for (int band = 0, last; band < n_bands && status == WEFT_OK; band = last) {
+        const double began_s = weft_clock_s();
+        last = step < n_bands - band ? band + step : n_bands;
         run_bands(band, last, n_rows, fn, context);
+        /* threads wait for each other between the steps: not more often than the eye and ^C ask for */
+        step *= weft_clock_s() - began_s < ENOUGH_S && step < n_bands ? 2 : 1;
         const int rows_before = band * WEFT_BAND_ROWS;
         const int rows_after = last * WEFT_BAND_ROWS < n_rows ? last * WEFT_BAND_ROWS : n_rows;
         status = weft_progress_step(&progress, rows_after - rows_before, err);
