@@ -33,6 +33,6 @@ compare near.png near-ktx2.png 0.9 1.05 5
 ours far.png 40x30
 look gltf-ktx2 far-ktx2.png 40 30 90 35
 compare far.png far-ktx2.png 0.2 1.08 90
-# the judge can fail: the light from the other side
-look gltf other.png 400 300 0 35
-if python3 "$judges/compare_views.py" near.png other.png 0.9 1.05 5; then echo "FAILED: any light will do"; exit 1; fi
+# the judge can fail: the light from another side
+"$weft" preview weave.material -o other.png --brdf ggx --light 0,35 --ambient 0 --size 400x300 >/dev/null
+if python3 "$judges/compare_views.py" near-png.png other.png 0.9 1.05 5; then echo "FAILED: any light will do"; exit 1; fi
