@@ -71,6 +71,8 @@ weft_err weft_baked_copy(const weft_baked *from, weft_baked *to, weft_error *err
     to->width = from->width;
     to->height = from->height;
     memcpy(to->size_mm, from->size_mm, sizeof to->size_mm);
+    to->thickness_mm = from->thickness_mm;
+    to->weight_gsm = from->weight_gsm;
     to->periodic = from->periodic;
     to->enable_diffuse = from->enable_diffuse;
     to->enable_specular = from->enable_specular;

@@ -62,11 +62,12 @@ typedef struct weft_baked_map {
 } weft_baked_map;
 
 typedef struct weft_baked {
-    char *name;                     /* of the material */
-    const weft_material_type *type; /* decides the reflectance model */
-    int width, height;              /* of level 0 of all maps, pixels */
-    double size_mm[2];              /* across and up; 0: unknown */
-    bool periodic;                  /* the right edge continues at the left, the top at the bottom */
+    char *name;                      /* of the material */
+    const weft_material_type *type;  /* decides the reflectance model */
+    int width, height;               /* of level 0 of all maps, pixels */
+    double size_mm[2];               /* across and up; 0: unknown */
+    double thickness_mm, weight_gsm; /* of the cloth; 0: unknown */
+    bool periodic;                   /* the right edge continues at the left, the top at the bottom */
     bool enable_diffuse, enable_specular;
     bool two_lobes; /* GGX and cloth side by side, each with parameters of its own (S-ORD-26); else those of
                        the one lobe are in the rows without "cloth" */

@@ -45,12 +45,13 @@ json_t *weft_material_describe(const weft_baked *baked)
     json_t *const maps = json_object();
     for (int k = 0; k < WEFT_BAKED_COUNT; k++)
         json_object_set_new(maps, weft_baked_rows[k].name, describe_map(baked, (weft_baked_kind)k));
-    return json_pack("{s:s, s:i, s:s, s:s, s:s, s:i, s:i, s:o, s:b, s:b, s:b, s:b, s:o}", "weft", "material",
-                     "version", WEFT_MATERIAL_VERSION, "name", baked->name, "type", baked->type->name, "brdf",
-                     weft_baked_brdf(baked), "width", baked->width, "height", baked->height, "size_mm",
-                     weft_json_numbers(baked->size_mm, 2), "periodic", baked->periodic, "enable_diffuse",
-                     baked->enable_diffuse, "enable_specular", baked->enable_specular, "two_lobes",
-                     baked->two_lobes, "maps", maps);
+    return json_pack("{s:s, s:i, s:s, s:s, s:s, s:i, s:i, s:o, s:b, s:b, s:b, s:b, s:f, s:f, s:o}", "weft",
+                     "material", "version", WEFT_MATERIAL_VERSION, "name", baked->name, "type",
+                     baked->type->name, "brdf", weft_baked_brdf(baked), "width", baked->width, "height",
+                     baked->height, "size_mm", weft_json_numbers(baked->size_mm, 2), "periodic",
+                     baked->periodic, "enable_diffuse", baked->enable_diffuse, "enable_specular",
+                     baked->enable_specular, "two_lobes", baked->two_lobes, "thickness_mm",
+                     baked->thickness_mm, "weight_gsm", baked->weight_gsm, "maps", maps);
 }
 
 static weft_err read_map_head(const json_t *maps, weft_baked *baked, weft_baked_kind kind, const char *place,
@@ -95,6 +96,10 @@ static weft_err read_head(const json_t *json, const char *place, weft_baked *bak
     WEFT_TRY(
         weft_json_get_bool(json, "enable_specular", WEFT_JSON_OPTIONAL, &baked->enable_specular, place, err));
     WEFT_TRY(weft_json_get_bool(json, "two_lobes", WEFT_JSON_OPTIONAL, &baked->two_lobes, place, err));
+    WEFT_TRY(weft_json_get_number(json, "thickness_mm", WEFT_JSON_OPTIONAL, 0, 100, &baked->thickness_mm,
+                                  place, err));
+    WEFT_TRY(
+        weft_json_get_number(json, "weight_gsm", WEFT_JSON_OPTIONAL, 0, 1e4, &baked->weight_gsm, place, err));
     for (int k = 0; k < WEFT_BAKED_COUNT; k++)
         WEFT_TRY(read_map_head(maps, baked, (weft_baked_kind)k, place, err));
     return WEFT_OK;

@@ -270,6 +270,29 @@ static json_t *own_section(const weft_baked *b)
                      (double)b->maps[WEFT_BAKED_RIM_AMPLITUDE].constant[0]);
 }
 
+static json_t *known(double value)
+{
+    return value > 0 ? json_real(value) : json_null();
+}
+
+/* Thickness in mm and weight in g/m2; of a source's physics the rest stays. */
+static void put_physics(const u3m *u, json_t *material)
+{
+    if (!(u->baked->thickness_mm > 0) && !(u->baked->weight_gsm > 0))
+        return;
+    json_t *const physics = json_object_get(material, "physics");
+    if (!json_is_object(physics)) {
+        json_object_set_new(material, "physics",
+                            json_pack("{s:o, s:o, s:n, s:{s:s}, s:n, s:n}", "thickness",
+                                      known(u->baked->thickness_mm), "weight", known(u->baked->weight_gsm),
+                                      "composition", "devices", "fab", "null", "material_type",
+                                      "construction"));
+        return;
+    }
+    json_object_set_new(physics, "thickness", known(u->baked->thickness_mm));
+    json_object_set_new(physics, "weight", known(u->baked->weight_gsm));
+}
+
 static void iso_time(time_t when, char text[32])
 {
     struct tm t;
@@ -354,6 +377,8 @@ static weft_err add_document(u3m *u, time_t when, weft_error *err)
     json_t *const side = json_object_get(json_object_get(document, "material"),
                                          u->keep.source ? u->keep.source->side_name : "front");
     weft_err status = document ? WEFT_OK : weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
+    if (status == WEFT_OK && !(u->keep.source && u->keep.same_physics))
+        put_physics(u, json_object_get(document, "material"));
     if (status == WEFT_OK)
         status = add_side(u, side, err);
     if (status == WEFT_OK)
@@ -442,6 +467,6 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 const weft_exporter weft_exporter_u3m = {
     .name = "u3m",
     .summary = "U3M 1.1 for textile programs, as .u3m with pictures and as one .u3ma",
-    .version = 3,
+    .version = 4,
     .write = write,
 };

@@ -19,7 +19,7 @@
 #include <string.h>
 
 /* Raised when the code of a step changes what it makes. */
-enum { COMPOSITE_VERSION = 3, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
+enum { COMPOSITE_VERSION = 4, HEIGHT_VERSION = 1, RELIEF_VERSION = 1, DETAIL_VERSION = 1, FILE_VERSION = 1 };
 
 enum { CAVITY_RADIUS_PX = 8 };
 
@@ -552,6 +552,8 @@ static void key_export(const builder *b, const weft_exporter *exporter, char hex
     weft_build_key_text(&key, "type", b->baked.type->name);
     weft_build_key_number(&key, "width_mm", b->baked.size_mm[0]);
     weft_build_key_number(&key, "height_mm", b->baked.size_mm[1]);
+    weft_build_key_number(&key, "thickness_mm", b->baked.thickness_mm);
+    weft_build_key_number(&key, "weight_gsm", b->baked.weight_gsm);
     weft_build_key_end(&key, hex);
 }
 

@@ -53,7 +53,7 @@ typedef struct compositor {
     weft_assets *assets;
     const weft_composite_options *options;
     int width, height;
-    double size_mm[2];
+    double size_mm[2], thickness_mm, weight_gsm;
     bool periodic;
     weft_runtime_layers *runtime; /* gets the outermost material's; NULL: nobody asks */
 } compositor;
@@ -219,6 +219,10 @@ static weft_err grow_by_u3m(compositor *c, const weft_rad_member *member, weft_e
     const weft_err status = weft_u3m_measure(u3m, &width, &height, err);
     if (status == WEFT_OK) {
         grow(c, width, height);
+        if (!(c->thickness_mm > 0))
+            c->thickness_mm = u3m->thickness_mm;
+        if (!(c->weight_gsm > 0))
+            c->weight_gsm = u3m->weight_gsm;
         if (!(c->size_mm[0] > 0)) {
             memcpy(c->size_mm, u3m->size_mm, sizeof c->size_mm);
             c->periodic = true; /* U3M's pictures repeat */
@@ -628,6 +632,8 @@ static weft_err run(weft_assets *assets, const weft_asset *asset, const weft_com
     const weft_rad_record *const p = &asset->properties;
     c.size_mm[0] = weft_rad_number(p, "width_mm", 0);
     c.size_mm[1] = weft_rad_number(p, "height_mm", 0);
+    c.thickness_mm = weft_rad_number(p, "thickness_mm", 0);
+    c.weight_gsm = weft_rad_number(p, "weight_gsm", 0);
     *baked = (weft_baked){0};
     WEFT_TRY(visit(assets, p, visit_size, &c, 0, err));
     if (options->width > 0) {
@@ -636,7 +642,12 @@ static weft_err run(weft_assets *assets, const weft_asset *asset, const weft_com
     } else if (c.width == 0) {
         c.width = c.height = DEFAULT_SIDE;
     }
-    return composite(&c, asset, 0, baked, err);
+    const weft_err status = composite(&c, asset, 0, baked, err);
+    if (status == WEFT_OK) {
+        baked->thickness_mm = c.thickness_mm;
+        baked->weight_gsm = c.weight_gsm;
+    }
+    return status;
 }
 
 weft_err weft_composite(weft_assets *assets, const weft_asset *asset, const weft_composite_options *options,

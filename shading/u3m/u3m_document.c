@@ -113,6 +113,9 @@ static weft_err check(weft_u3m *u, weft_error *err)
         WEFT_TRY(check_parameter(u, i, err));
     const json_t *const ours = json_object_get(json_object_get(u->document, "custom"), "weft");
     u->ours = json_is_object(ours) && json_is_string(json_object_get(ours, "model")) ? ours : NULL;
+    const json_t *const physics = json_object_get(material, "physics");
+    u->thickness_mm = fmin(fmax(json_number_value(json_object_get(physics, "thickness")), 0), 100);
+    u->weight_gsm = fmin(fmax(json_number_value(json_object_get(physics, "weight")), 0), 1e4);
     if (u->ours && !(u->size_mm[0] > 0)) /* of constants alone no picture tells the size */
         WEFT_TRY(weft_json_get_numbers(u->ours, "size_mm", WEFT_JSON_OPTIONAL, 2, u->size_mm, u->path, err));
     return WEFT_OK;

@@ -26,9 +26,10 @@ typedef struct weft_u3m {
     const char *name;      /* of the material */
     const char *side_name; /* "front", "back" or "side" */
     const json_t *side;
-    bool is_1_0;        /* lengths in cm, dpi one number, rotation in degrees */
-    const json_t *ours; /* custom.weft, when Weft wrote the document; else NULL */
-    double size_mm[2];  /* of its first picture; 0 without any */
+    bool is_1_0;                     /* lengths in cm, dpi one number, rotation in degrees */
+    const json_t *ours;              /* custom.weft, when Weft wrote the document; else NULL */
+    double size_mm[2];               /* of its first picture; 0 without any */
+    double thickness_mm, weight_gsm; /* of its physics; 0: not said */
 } weft_u3m;
 
 /** Opens and checks: version, the side, every parameter that is read, each picture there (but not yet read).

@@ -79,6 +79,8 @@ weft_err weft_u3m_keep_open(const weft_baked *baked, weft_u3m_keep *keep, weft_e
     }
     keep->is_metal = is_metal(&from) || is_metal(baked);
     weft_u3m_identifier(keep->source->name, identifier, sizeof identifier);
+    keep->same_physics = fabs(baked->thickness_mm - keep->source->thickness_mm) < 1e-9 &&
+                         fabs(baked->weight_gsm - keep->source->weight_gsm) < 1e-9;
     keep->same_name = strcmp(identifier, baked->name) == 0;
     weft_baked_fini(&from);
     return WEFT_OK;
@@ -123,7 +125,7 @@ bool weft_u3m_keeps_all(const weft_u3m_keep *keep)
     for (int k = 0; k < WEFT_BAKED_COUNT; k++)
         if (keep->changed[k])
             return false;
-    return keep->same_name;
+    return keep->same_name && keep->same_physics;
 }
 
 /* -- from 1.0 to 1.1 ---------------------------------------------------------------------------------- */

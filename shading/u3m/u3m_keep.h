@@ -14,6 +14,7 @@ typedef struct weft_u3m_keep {
     bool changed[WEFT_BAKED_COUNT]; /* the quantity is no longer the source's */
     bool is_metal;                  /* the colour is also that of F0 */
     bool same_name;                 /* the material has the source's name */
+    bool same_physics;              /* and its thickness and weight */
 } weft_u3m_keep;
 
 /** Opens baked->u3m and compares.  @return as weft_u3m_open() and weft_u3m_bake() */

@@ -36,12 +36,13 @@ near(maps["albedo"]["constant"][1], mean(lambda t: decode((200 - 4 * t[1]) / 255
 near(maps["roughness"]["constant"][0], mean(lambda t: (0.25 + 0.5 * 4 * t[0] / 255) ** 2) / math.sqrt(1 - 0.9 * 0.4))
 near(maps["anisotropy"]["constant"][0], 0.36)
 near(maps["specular"]["constant"][0], 0.04, 1e-6)
+assert (doc["thickness_mm"], doc["weight_gsm"]) == (0.8, 310)
 TEXT
 
 # a child that changes the colour: that alone is written anew
 cat >red.radattr <<'TEXT'
 :Harris_Tweed_7 := ( anisotropicmaterial :u3m = "tweed.u3ma" :albedo_tint_color = [1, 0.2, 0.2] )
-:rough := ( anisotropicmaterial :u3m = "tweed.u3ma" :specular_roughness = 0.8 )
+:rough := ( anisotropicmaterial :u3m = "tweed.u3ma" :specular_roughness = 0.8 :weight_gsm = 290 )
 TEXT
 for material in Harris_Tweed_7 rough; do
     "$weft" bake red.radattr --material $material -o $material.material --export u3m >/dev/null
@@ -61,6 +62,7 @@ assert set(red) == set(old) - {"maps/Base Colour.png"} | {"textures/weft/basecol
 assert all(red[n] == old[n] for n in set(red) & set(old) - {name})
 changed = {k for k in a["material"]["front"] if a["material"]["front"][k] != c["material"]["front"][k]}
 assert changed == {"roughness"}, changed
+assert c["material"]["physics"] == {**a["material"]["physics"], "weight": 290}
 assert c["material"]["name"] == "rough" and c["material"]["id"] != a["material"]["id"]
 TEXT
 
@@ -71,7 +73,7 @@ include <silk.radattr>
 include <velvet.radattr>
 include <metal_thread.radattr>
 :pile := ( velvet :scan = "twill.maps" :rim_tint_color = [1, 0.5, 0.25] )
-:shine := ( silk_satin :width_mm = 30 :tangent_rotation_deg = 30 )
+:shine := ( silk_satin :width_mm = 30 :tangent_rotation_deg = 30 :thickness_mm = 0.25 :weight_gsm = 80 )
 :gold := ( gold_thread :scan = "twill.maps" )
 TEXT
 for material in pile shine gold; do
@@ -81,7 +83,7 @@ for material in pile shine gold; do
     python3 - $material <<'TEXT'
 import json, sys
 a, b = (json.load(open(f"{sys.argv[1]}.{k}/material.json")) for k in ("material", "again"))
-assert a["type"] == b["type"] and all(abs(x - y) < 1e-3 for x, y in zip(a["size_mm"], b["size_mm"])), (a["size_mm"], b["size_mm"])
+assert all(a[k] == b[k] for k in ("type", "thickness_mm", "weight_gsm")) and all(abs(x - y) < 1e-3 for x, y in zip(a["size_mm"], b["size_mm"])), (a["size_mm"], b["size_mm"])
 for kind in ("albedo", "specular", "roughness", "anisotropy", "tangent", "normal", "height", "opacity", "cloth", "front_tint", "rim_tint", "rim_amplitude"):
     map = a["maps"][kind]
     tolerance = 0.02 if sys.argv[1] == "gold" and kind in ("specular", "albedo") else 2e-3 # a metal's F0 is its base colour
