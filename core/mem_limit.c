@@ -141,6 +141,8 @@ weft_mem_place weft_mem_choose_place(size_t bytes)
         known.heap += place == WEFT_MEM_HEAP ? (double)bytes : 0;
     }
     pthread_mutex_unlock(&known.lock);
+    if (place == WEFT_MEM_HEAP && weft_mem_resident() + (double)bytes > atomic_load(&trim_above))
+        weft_mem_give_back(); /* it is about to be touched as a whole */
     return place;
 }
 

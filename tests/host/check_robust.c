@@ -134,6 +134,45 @@ static void test_cast_shadows_and_highlights_do_not_reach_the_normal(void **stat
 }
 
 /* A flank of 65 degrees that only a few of the lights reach. */
+/* Of many lights only some triples are tried: enough, when every third light contradicts. */
+static void test_many_lights_of_which_a_third_contradicts(void **state)
+{
+    (void)state;
+    static const int numbers[] = {11, 12, 13, 17, 24, 33, 48, 64, WEFT_LIGHTS_MAX};
+    uint64_t random = 5;
+    for (int i = 0; i < (int)(sizeof numbers / sizeof numbers[0]); i++) {
+        const int n = numbers[i];
+        double worst = 0;
+        for (int round = 0; round < 20; round++) {
+            static weft_solve_samples s;
+            weft_solve_answers a;
+            truth t;
+            s = (weft_solve_samples){.n_lights = n, .n_channels = 1};
+            for (int k = 0; k < LANES; k++) {
+                const double tilt = 0.4 * weft_test_random(&random),
+                             around = 2 * pi * weft_test_random(&random);
+                normal_of(tilt * cos(around), tilt * sin(around), t.normal[k]);
+                for (int j = 0; j < n; j++) { /* a spiral over the dome */
+                    const double up = (35 + 50.0 * j / n) * pi / 180, angle = 2.4 * j;
+                    const double l[3] = {cos(up) * cos(angle), cos(up) * sin(angle), sin(up)};
+                    const bool wrong = (j + k) % 3 == 0;
+                    const double off = 0.3 * weft_test_random(&random);
+                    const double factor = !wrong ? 1 : j & 1 ? 1.7 + off : 0.3 + off;
+                    for (int c = 0; c < 3; c++)
+                        s.at[j].light[c][k] = (float)l[c];
+                    s.at[j].value[0][k] = s.at[j].grey[k] = (float)(0.5 * factor * dot(t.normal[k], l));
+                    s.at[j].weight[k] = 1;
+                }
+            }
+            solve(&weft_method_robust, &s, &a);
+            for (int k = 0; k < LANES; k++)
+                worst = fmax(worst, error_deg(&a, &t, k));
+        }
+        print_message("%3d lights: at worst %.5f degrees\n", n, worst);
+        assert_true(worst < 0.001);
+    }
+}
+
 static void test_steep_flanks_keep_the_lights_that_reach_them(void **state)
 {
     (void)state;
@@ -434,6 +473,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cast_shadows_and_highlights_do_not_reach_the_normal),
+        cmocka_unit_test(test_many_lights_of_which_a_third_contradicts),
         cmocka_unit_test(test_steep_flanks_keep_the_lights_that_reach_them),
         cmocka_unit_test(test_three_lights_are_kept_whatever_happens),
         cmocka_unit_test(test_matte_cloth_is_plain_least_squares),
