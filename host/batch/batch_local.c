@@ -152,6 +152,8 @@ static weft_err work(local_run *run, weft_error *err)
             interrupted = true;
         }
     }
+    if (status == WEFT_OK && weft_batch_count(run->batch, WEFT_BATCH_WAITING) > 0)
+        status = weft_progress_step(&progress, 0, err); /* cancelled when one had ended and none had begun */
     weft_progress_end(&progress);
     for (int i = 0; i < run->n_slots; i++)
         weft_child_destroy(run->slots[i].child);
