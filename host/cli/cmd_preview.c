@@ -19,12 +19,14 @@ typedef struct preview_args {
     const char *output, *brdf, *match, *cal, *env, *columns;
     weft_texts params, lamps, polarise;
     weft_numbers light, light_mm, crop, sky;
-    int shape, area, sky_model, tone, sweep, turntable, quality, shadow_steps, shadow_blur, folds, voxels;
-    bool draft, self_shadow, resume;
+    int shape, area, sky_model, tone, sweep, turntable, quality, shadow_steps, shadow_blur, folds, voxels,
+        accumulate, fog_steps;
+    bool draft, self_shadow, resume, temporal, fog_even;
     const char *height_map;
     int filter, taps;
     weft_size size;
-    double hour, ambient_saturation, fps, exposure_ev, env_scale, ambient, background, repeat, fov_deg;
+    double fog, fog_g, sun_disc_deg, hour, ambient_saturation, fps, exposure_ev, env_scale, ambient,
+        background, repeat, fov_deg;
 } preview_args;
 
 static const weft_field fields[] = {
@@ -234,6 +236,25 @@ static const weft_field fields[] = {
      .choices = "coarse|always|never",
      .def = "coarse",
      .help = "dither and blur shadows where a ray is coarse or a lamp large, or everywhere, or nowhere"},
+    {.key = "accumulate",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, accumulate),
+     .min = 1,
+     .max = 1024,
+     .def = "1",
+     .help = "looks for each shadow, with other dithers and places on the lamps: their mean is soft"},
+    {.key = "sun-disc",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, sun_disc_deg),
+     .unit = "deg",
+     .min = 0,
+     .max = 30,
+     .def = "0.27",
+     .help = "half angle of distant lamps under --accumulate or --temporal; the default is the sun's"},
+    {.key = "temporal",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(preview_args, temporal),
+     .help = "shadows of a sequence remember the frame before: less flicker from few steps"},
     {.key = "folds",
      .type = WEFT_FIELD_CHOICE,
      .offset = offsetof(preview_args, folds),
@@ -260,6 +281,31 @@ static const weft_field fields[] = {
      .max = WEFT_PREVIEW_MAX_TAPS,
      .def = "8",
      .help = "most look-ups along a footprint of --filter anisotropic"},
+    {.key = "fog",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, fog),
+     .min = 0,
+     .max = 1000,
+     .def = "0",
+     .help = "light in the air before the sample: optical depth of the box around it, 0.3 is a haze"},
+    {.key = "fog-g",
+     .type = WEFT_FIELD_F64,
+     .offset = offsetof(preview_args, fog_g),
+     .min = -0.99,
+     .max = 0.99,
+     .def = "0.5",
+     .help = "how far the air scatters forwards: above 0 it glows around the lamps"},
+    {.key = "fog-steps",
+     .type = WEFT_FIELD_INT,
+     .offset = offsetof(preview_args, fog_steps),
+     .min = 1,
+     .max = 4096,
+     .def = "12",
+     .help = "looks along each ray through the air"},
+    {.key = "fog-even",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(preview_args, fog_even),
+     .help = "a glow of one strength whatever the distance, which dims nothing"},
     {.key = "match",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(preview_args, match),
@@ -365,6 +411,7 @@ static weft_err look_round(const weft_invocation *inv, const preview_args *a, co
                                             .n_frames = a->turntable ? a->turntable : a->sweep,
                                             .turntable = a->turntable > 0,
                                             .resume = a->resume,
+                                            .temporal = a->temporal,
                                             .frames_per_s = a->fps,
                                             .quality = a->quality,
                                             .tone = (weft_tone)a->tone};
@@ -403,10 +450,14 @@ static weft_err set_view(const preview_args *a, weft_preview_view *view, weft_er
     view->repeat = a->repeat;
     view->fov_deg = a->fov_deg;
     view->draft = a->draft;
+    view->fog =
+        (weft_preview_fog){.depth = a->fog, .g = a->fog_g, .steps = a->fog_steps, .even = a->fog_even};
     view->shadows = (weft_preview_shadows){.relief = a->self_shadow,
                                            .blur = (weft_preview_blur)a->shadow_blur,
                                            .steps = a->shadow_steps,
                                            .folds = (weft_preview_folds)a->folds,
+                                           .accumulate = a->accumulate,
+                                           .disc_rad = a->sun_disc_deg * 3.14159265358979323846 / 180,
                                            .voxels = a->voxels,
                                            .voxel_steps = a->voxels < 32 ? 8 : a->voxels / 4};
     view->filter = (weft_preview_filter)a->filter;
@@ -492,6 +543,8 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
     if (is_sequence(a) && (a->match || a->columns || (a->sweep && a->turntable)))
         return weft_fail(err, WEFT_ERR_USAGE,
                          "--sweep and --turntable go neither with each other nor with --match or --columns");
+    if (a->temporal && !is_sequence(a))
+        return weft_fail(err, WEFT_ERR_USAGE, "--temporal wants --sweep N or --turntable N");
     if (!is_sequence(a) && (a->resume || weft_path_has_suffix(a->output, ".webp")))
         return weft_fail(err, WEFT_ERR_USAGE, "--resume and a .webp want --sweep N or --turntable N");
     if (!a->match != !a->cal)

@@ -10,6 +10,7 @@
 #include "core/sha256.h"
 #include "core/version.h"
 #include "shading/brdf/half_vector.h"
+#include "shading/preview/preview_history.h"
 
 #include <string.h>
 #include <unistd.h>
@@ -78,7 +79,8 @@ static void add_view(weft_sha256 *hash, const weft_preview_view *view)
                               view->crop.y,     view->crop.width,     view->crop.height, view->draft,
                               view->fov_deg,    view->turn_rad,       view->filter,      view->max_taps,
                               shadows->relief,  shadows->blur,        shadows->steps,    shadows->folds,
-                              shadows->voxels,  shadows->voxel_steps, shadows->phase,    view->n_lights};
+                              shadows->voxels,  shadows->voxel_steps, shadows->phase,    view->fog.depth,
+                              view->fog.g,      view->fog.steps,      view->fog.even,    view->n_lights};
     add_numbers(hash, (int)(sizeof numbers / sizeof numbers[0]), numbers);
     for (int k = 0; k < view->n_lights; k++) {
         const weft_preview_light *const light = &view->lights[k];
@@ -106,6 +108,9 @@ static void find_key(run *r)
     add_number(&hash, r->sequence->n_frames);
     add_number(&hash, r->sequence->turntable);
     add_number(&hash, r->sequence->tone);
+    add_number(&hash, r->sequence->temporal);
+    add_number(&hash, r->view->shadows.accumulate);
+    add_number(&hash, r->view->shadows.disc_rad);
     add_surface(&hash, r->surface);
     add_view(&hash, r->view);
     weft_sha256_final_hex(&hash, r->key);
@@ -234,12 +239,11 @@ static void turn(double v[3], double angle)
     v[1] = sin(angle) * x + cos(angle) * y;
 }
 
-static weft_err render_frame(const run *r, int frame, const char *path, weft_preview_sequence_report *report,
-                             weft_error *err)
+/* The view of a frame. */
+static weft_preview_view view_of(const run *r, int frame)
 {
     weft_preview_view view = *r->view;
-    weft_image picture;
-    const double angle = 2 * WEFT_PI * frame / r->sequence->n_frames, began_s = weft_clock_s();
+    const double angle = 2 * WEFT_PI * frame / r->sequence->n_frames;
     if (r->sequence->turntable)
         view.turn_rad += angle;
     for (int k = 0; k < view.n_lights && !r->sequence->turntable; k++) {
@@ -247,7 +251,15 @@ static weft_err render_frame(const run *r, int frame, const char *path, weft_pre
         turn(view.lights[k].position_mm, angle);
         turn(view.lights[k].end_mm, angle);
     }
-    WEFT_TRY(weft_preview_render(r->surface, &view, &picture, err));
+    return view;
+}
+
+static weft_err render_frame(const run *r, const weft_preview_view *view, const char *path,
+                             weft_preview_sequence_report *report, weft_error *err)
+{
+    weft_image picture;
+    const double began_s = weft_clock_s();
+    WEFT_TRY(weft_preview_render(r->surface, view, &picture, err));
     report->seconds += weft_clock_s() - began_s;
     report->rendered++;
     weft_tone_image(r->sequence->tone, &picture);
@@ -259,21 +271,28 @@ static weft_err render_frame(const run *r, int frame, const char *path, weft_pre
 static weft_err render_frames(const run *r, weft_preview_sequence_report *report, weft_error *err)
 {
     weft_progress progress;
+    weft_preview_history history = {0};
     weft_err status = WEFT_OK;
     weft_progress_begin(&progress, r->sequence->turntable ? "turntable" : "sweep", "frames",
                         r->sequence->n_frames);
     weft_progress_hide(true);
     for (int frame = 0; frame < r->sequence->n_frames && status == WEFT_OK; frame++) {
         char *const path = frame_path(r, frame, err);
-        status = path ? WEFT_OK : WEFT_ERR_NOMEM;
-        if (path && weft_file_exists(path))
-            report->kept++;
-        else if (path)
-            status = render_frame(r, frame, path, report, err);
+        const bool kept = path && weft_file_exists(path);
+        weft_preview_view view = view_of(r, frame);
+        view.shadows.history = r->sequence->temporal ? &history : NULL;
+        if (!path)
+            status = WEFT_ERR_NOMEM;
+        else if (!kept)
+            status = render_frame(r, &view, path, report, err);
+        else if (view.shadows.history) /* later frames shall be what they would have been */
+            status = weft_preview_remember(r->surface, &view, err);
+        report->kept += kept;
         weft_free(path);
         if (status == WEFT_OK)
             status = weft_progress_step(&progress, 1, err);
     }
+    weft_preview_history_fini(&history);
     weft_progress_hide(false);
     weft_progress_end(&progress);
     return status;

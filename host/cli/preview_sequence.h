@@ -12,6 +12,7 @@ typedef struct weft_preview_sequence {
     int n_frames;       /* 1..999 */
     bool turntable;     /* the sample goes once round; else the lamps do, about the z axis */
     bool resume;        /* keep the frames that an earlier run has left */
+    bool temporal;      /* shadows remember the frame before */
     double frames_per_s;
     int quality; /* of WebP, 100 is lossless */
     weft_tone tone;

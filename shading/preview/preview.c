@@ -1,5 +1,6 @@
 #include "shading/preview/preview.h"
 
+#include "shading/preview/preview_fog.h"
 #include "shading/preview/preview_samples.h"
 #include "shading/preview/preview_visibility.h"
 
@@ -234,6 +235,9 @@ static weft_err check_shadows(const weft_preview_surface *surface, const weft_pr
     if (shadows->folds == WEFT_PREVIEW_FOLDS_MARCHED &&
         (shadows->voxel_steps < 1 || shadows->voxel_steps > 100000))
         return weft_fail(err, WEFT_ERR_RANGE, "wanted 1 to 100000 steps through the voxels");
+    if (shadows->accumulate < 0 || shadows->accumulate > 4096 ||
+        !(shadows->disc_rad >= 0 && shadows->disc_rad < 1))
+        return weft_fail(err, WEFT_ERR_RANGE, "wanted up to 4096 looks and a disc below one radian");
     return shadows->relief ? check_size(surface, surface->height_mm, "height", err) : WEFT_OK;
 }
 
@@ -262,6 +266,10 @@ static weft_err check_surface(const weft_preview_surface *surface, const weft_pr
                              "a light at a position in mm needs maps with a scale; these have none (solve "
                              "with --geometry plane, or give the light as azimuth and elevation)");
     WEFT_TRY(check_shadows(surface, view, err));
+    if (!(view->fog.depth >= 0 && view->fog.depth <= 1000) || !(fabs(view->fog.g) < 1) ||
+        (view->fog.depth > 0 && (view->fog.steps < 1 || view->fog.steps > 4096)))
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "wanted fog of a depth from 0 to 1000, g between -1 and 1, and 1 to 4096 steps");
     if (view->filter != WEFT_PREVIEW_SAMPLES &&
         (view->max_taps < 1 || view->max_taps > WEFT_PREVIEW_MAX_TAPS))
         return weft_fail(err, WEFT_ERR_RANGE, "%d look-ups along a footprint; wanted 1 to %d", view->max_taps,
@@ -371,6 +379,8 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
     if (status == WEFT_OK)
         status =
             weft_parallel_rows_progress(view->height, render_rows, &(render){&setup, &made}, "preview", err);
+    if (status == WEFT_OK && view->fog.depth > 0)
+        status = weft_preview_add_fog(&setup, &made, err);
     weft_environment_planes_fini(&setup.around);
     weft_preview_visibility_fini(&visibility);
     weft_preview_texture_fini(&own);
@@ -379,4 +389,21 @@ weft_err weft_preview_render(const weft_preview_surface *surface, const weft_pre
     else
         *picture = made;
     return status;
+}
+
+weft_err weft_preview_remember(const weft_preview_surface *surface, const weft_preview_view *given,
+                               weft_error *err)
+{
+    weft_preview_view turned = *given;
+    weft_preview_setup setup = {.surface = surface, .view = &turned};
+    weft_preview_visibility visibility = {0};
+    int finest;
+    WEFT_TRY(prepare(&setup, &finest, err));
+    if (given->turn_rad != 0)
+        weft_preview_turn_lamps(&setup, &turned);
+    if (!wants_visibility(&turned))
+        return WEFT_OK;
+    WEFT_TRY(weft_preview_visibility_init(&visibility, &setup, err));
+    weft_preview_visibility_fini(&visibility);
+    return WEFT_OK;
 }

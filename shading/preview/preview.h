@@ -140,6 +140,8 @@ typedef enum weft_preview_blur {
     WEFT_PREVIEW_BLUR_NEVER,
 } weft_preview_blur;
 
+struct weft_preview_history;
+
 /** Shadows that are looked for once a place, dithered and blurred (S-BLG-06).  {0}: none of them. */
 typedef struct weft_preview_shadows {
     bool relief; /* surface->height_mm shadows itself */
@@ -148,8 +150,20 @@ typedef struct weft_preview_shadows {
     weft_preview_folds folds;
     int voxels;      /* along the drape's width, 8..512 */
     int voxel_steps; /* of a marched ray; a quarter of the voxels is about one each */
-    int phase;       /* of the dither: the frame of a sequence */
+    int phase;       /* of the dither, 0..15 */
+    int accumulate;  /* looks at each place, with other dithers and places on the lamps: their mean; 0 is 1 */
+    double disc_rad; /* of distant lamps, when there are several looks: 0.0047 is the sun's (S-BLG-07) */
+    struct weft_preview_history *history; /* of a sequence of frames; NULL: each on its own */
 } weft_preview_shadows;
+
+/** Light in the air before the sample (preview_fog.h).  {0}: none. */
+typedef struct weft_preview_fog {
+    double depth; /* optical depth of the whole box; 0: no fog */
+    double g;     /* of Henyey and Greenstein, -1..1: above 0 it glows around the lamps */
+    int steps;    /* along a ray, 1..4096 */
+    bool even;    /* the blog's mean over the steps, times depth: as bright near as far, takes nothing away */
+    bool plain;   /* every pixel, without dither and blur: for comparing */
+} weft_preview_fog;
 
 /** How it is looked at.  weft_preview_view_defaults() fills it. */
 typedef struct weft_preview_view {
@@ -159,6 +173,7 @@ typedef struct weft_preview_view {
     weft_preview_light lights[WEFT_PREVIEW_MAX_LIGHTS];
     weft_preview_surroundings surroundings;
     weft_preview_shadows shadows;
+    weft_preview_fog fog;
     double ambient;         /* radiance of a white sky all round, answered as by a Lambertian of the albedo */
     double exposure_ev;     /* the picture is multiplied by 2^exposure_ev */
     double background;      /* linear grey, not exposed */
@@ -190,5 +205,10 @@ weft_err weft_preview_pack(const weft_preview_surface *surface, const weft_previ
  */
 weft_err weft_preview_render(const weft_preview_surface *surface, const weft_preview_view *view,
                              weft_image *picture, weft_error *err);
+
+/** Looks for the shadows of a frame of a sequence for its history alone: as weft_preview_render() without the
+ *  picture. */
+weft_err weft_preview_remember(const weft_preview_surface *surface, const weft_preview_view *view,
+                               weft_error *err);
 
 #endif

@@ -2,7 +2,11 @@
 
 #include "core/parallel.h"
 #include "shading/brdf/half_vector.h"
+#include "shading/brdf/sampling.h"
 #include "shading/preview/bayer.h"
+#include "shading/preview/preview_history.h"
+
+#include <string.h>
 
 #define MOST_PLACES (1 << 27) /* of all planes together: half a gigabyte */
 
@@ -12,6 +16,8 @@
 typedef struct look_job {
     const weft_preview_setup *setup;
     weft_preview_visibility *visibility;
+    const weft_preview_light *lights; /* distant ones at a place of their disc */
+    int phase;                        /* of the dither */
 } look_job;
 
 /* ---- one look a place ---- */
@@ -81,13 +87,13 @@ static void look_at_lamp(const look_job *job, weft_preview_samples *s, int light
 {
     const weft_preview_visibility *const vis = job->visibility;
     const weft_preview_shadows *const how = &job->setup->view->shadows;
-    const weft_preview_light *const lamp = &job->setup->view->lights[light];
+    const weft_preview_light *const lamp = &job->lights[light];
     const bool large = lamp->kind == WEFT_PREVIEW_BALL || lamp->kind == WEFT_PREVIEW_TUBE;
     const bool plain = how->blur == WEFT_PREVIEW_BLUR_NEVER;
     float *const to = weft_image_row(&vis->lit, light, row);
     for (int i = 0; i < s->n; i++) {
-        const double b = plain ? 0.5 : weft_bayer(first + i, row, how->phase) + 1.0 / 32;
-        const double other = plain ? 0.5 : weft_bayer(row + 1, first + i + 2, how->phase) + 1.0 / 32;
+        const double b = plain ? 0.5 : weft_bayer(first + i, row, job->phase) + 1.0 / 32;
+        const double other = plain ? 0.5 : weft_bayer(row + 1, first + i + 2, job->phase) + 1.0 / 32;
         int folds = 1, relief = 1;
         if (s->hit[i] > 0) {
             if (large)
@@ -115,22 +121,27 @@ static double depth_at(const look_job *job, const weft_preview_samples *s, int i
     return depth;
 }
 
+void weft_preview_visibility_hit(const weft_preview_setup *setup, const weft_preview_visibility *vis,
+                                 int first, int row, weft_preview_samples *s)
+{
+    const int rest = vis->depth.width - first;
+    s->n = rest < WEFT_PREVIEW_RUN ? rest : WEFT_PREVIEW_RUN;
+    for (int i = 0; i < s->n; i++) {
+        s->x[i] = (float)((first + i + 0.5) / vis->scale - setup->view->width / 2.0);
+        s->y[i] = (float)(setup->view->height / 2.0 - (row + 0.5) / vis->scale);
+    }
+    weft_preview_hit(setup, s);
+}
+
 static void look_rows(void *context, int band, int row_begin, int row_end)
 {
     const look_job *const job = context;
     weft_preview_visibility *const vis = job->visibility;
-    const double scale = vis->scale;
     weft_preview_samples s = {0};
     (void)band;
     for (int row = row_begin; row < row_end; row++)
         for (int first = 0; first < vis->depth.width; first += WEFT_PREVIEW_RUN) {
-            const int rest = vis->depth.width - first;
-            s.n = rest < WEFT_PREVIEW_RUN ? rest : WEFT_PREVIEW_RUN;
-            for (int i = 0; i < s.n; i++) {
-                s.x[i] = (float)((first + i + 0.5) / scale - job->setup->view->width / 2.0);
-                s.y[i] = (float)(job->setup->view->height / 2.0 - (row + 0.5) / scale);
-            }
-            weft_preview_hit(job->setup, &s);
+            weft_preview_visibility_hit(job->setup, vis, first, row, &s);
             for (int i = 0; i < s.n; i++)
                 weft_image_row(&vis->depth, 0, row)[first + i] =
                     s.hit[i] > 0 ? (float)depth_at(job, &s, i) : NAN;
@@ -249,16 +260,78 @@ static weft_err prepare(weft_preview_visibility *vis, const weft_preview_setup *
     return weft_image_init(&vis->lit, width, height, view->n_lights, err);
 }
 
+/* Place k of n on a disc of `radius` about a unit direction: Hammersley's points, even in area. */
+static void jitter(double direction[3], double radius, uint32_t k, uint32_t n)
+{
+    double u[2], t[3], length2 = 0;
+    weft_hammersley(k, n, u);
+    const double r = radius * sqrt(u[0] + 0.5 / n), phi = 2 * WEFT_PI * u[1];
+    const int small = fabs(direction[0]) < 0.7 ? 0 : 1;
+    for (int c = 0; c < 3; c++)
+        t[c] = (c == small) - direction[small] * direction[c];
+    for (int c = 0; c < 3; c++)
+        length2 += t[c] * t[c];
+    for (int c = 0; c < 3; c++)
+        t[c] /= sqrt(length2);
+    const double *const d = direction;
+    const double b[3] = {d[1] * t[2] - d[2] * t[1], d[2] * t[0] - d[0] * t[2], d[0] * t[1] - d[1] * t[0]};
+    double moved[3];
+    length2 = 0;
+    for (int c = 0; c < 3; c++) {
+        moved[c] = d[c] + r * (cos(phi) * t[c] + sin(phi) * b[c]);
+        length2 += moved[c] * moved[c];
+    }
+    for (int c = 0; c < 3; c++)
+        direction[c] = moved[c] / sqrt(length2);
+}
+
+/* One look at every place, blurred; number k of n whose mean is wanted. */
+static weft_err look(const weft_preview_setup *setup, weft_preview_visibility *vis, int k, int n,
+                     weft_error *err)
+{
+    const weft_preview_view *const view = setup->view;
+    weft_preview_light lights[WEFT_PREVIEW_MAX_LIGHTS];
+    const look_job job = {setup, vis, lights, (view->shadows.phase + 5 * k) & 15};
+    memcpy(lights, view->lights, sizeof lights);
+    for (int i = 0; i < view->n_lights && n > 1; i++)
+        if (lights[i].kind == WEFT_PREVIEW_DISTANT)
+            jitter(lights[i].direction, view->shadows.disc_rad, (uint32_t)k, (uint32_t)n);
+    WEFT_TRY(weft_parallel_rows_progress(vis->depth.height, look_rows, (void *)&job, "shadows", err));
+    return blur(vis, err);
+}
+
+/* The mean of n looks, each with its own dither and place on the lamp. */
+static weft_err look_often(const weft_preview_setup *setup, weft_preview_visibility *vis, int n,
+                           weft_error *err)
+{
+    weft_image mean;
+    WEFT_TRY(weft_image_init(&mean, vis->lit.width, vis->lit.height, vis->lit.planes, err));
+    const size_t size = weft_image_plane_size(&mean) * (size_t)mean.planes;
+    weft_err status = WEFT_OK;
+    for (int k = 0; k < n && status == WEFT_OK; k++) {
+        status = look(setup, vis, k, n, err);
+        for (size_t i = 0; i < size && status == WEFT_OK; i++)
+            mean.data[i] += vis->lit.data[i] / (float)n;
+    }
+    weft_image_fini(&vis->lit);
+    vis->lit = mean;
+    return status;
+}
+
 weft_err weft_preview_visibility_init(weft_preview_visibility *visibility, const weft_preview_setup *setup,
                                       weft_error *err)
 {
+    enum { PHASES = 16 }; /* of the memory; sevens go through them far apart */
+    const weft_preview_shadows *const how = &setup->view->shadows;
     weft_preview_visibility made = {0};
     weft_err status = prepare(&made, setup, err);
-    if (status == WEFT_OK)
-        status = weft_parallel_rows_progress(made.depth.height, look_rows, &(look_job){setup, &made},
-                                             "shadows", err);
-    if (status == WEFT_OK)
-        status = blur(&made, err);
+    if (status == WEFT_OK && how->accumulate > 1)
+        status = look_often(setup, &made, how->accumulate, err);
+    else if (status == WEFT_OK)
+        status = how->history ? look(setup, &made, 7 * how->history->frame++ % PHASES, PHASES, err)
+                              : look(setup, &made, 0, 1, err);
+    if (status == WEFT_OK && how->history)
+        status = weft_preview_history_add(how->history, setup, &made, err);
     if (status != WEFT_OK)
         weft_preview_visibility_fini(&made);
     else

@@ -29,6 +29,10 @@ weft_err weft_preview_visibility_init(weft_preview_visibility *visibility, const
                                       weft_error *err);
 void weft_preview_visibility_fini(weft_preview_visibility *visibility);
 
+/** Fills the samples of a run of the buffer: hit, u, v, axis and eye at its places from `first` on. */
+void weft_preview_visibility_hit(const weft_preview_setup *setup, const weft_preview_visibility *visibility,
+                                 int first, int row, weft_preview_samples *samples);
+
 /** Fills s->visible for a lamp of the view. */
 void weft_preview_see(const weft_preview_setup *setup, int light, weft_preview_samples *s);
 

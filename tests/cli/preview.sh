@@ -144,6 +144,15 @@ expect 0 'lit.exr' "$weft" preview weave.maps -o lit.exr --light 20,15 --size 20
 expect 0 'dark.exr' "$weft" preview weave.maps -o dark.exr --light 20,15 --size 200x150 --self-shadow
 ! cmp -s lit.exr dark.exr
 expect 0 'coarse.png' "$weft" preview weave.maps -o coarse.png --shape sphere --size 60x60 --self-shadow --shadow-steps 4 --shadow-blur always
+expect 0 'soft.png' "$weft" preview weave.maps -o soft.png --size 60x45 --light 20,15 --self-shadow --accumulate 8 --sun-disc 3
+expect 2 'wants --sweep N' "$weft" preview weave.maps -o x.png --temporal
+expect 0 '4 frames' "$weft" preview weave.maps -o soft.png --sweep 4 --size 30x24 --self-shadow --shadow-steps 4 --temporal
+cp soft-003.png kept.png && rm soft-003.png # resumed, it remembers what the kept frames were
+expect 0 '3 of them kept' "$weft" preview weave.maps -o soft.png --sweep 4 --size 30x24 --self-shadow --shadow-steps 4 --temporal --resume
+cmp soft-003.png kept.png
+expect 0 'fog.png' "$weft" preview weave.maps -o fog.png --shape drape --size 40x40 --lamp ball:-40,40,60,9 --fog 0.5
+expect 0 'even.png' "$weft" preview weave.maps -o even.png --size 40x40 --fog 0.5 --fog-even --fog-g 0
+expect 2 'fog-g' "$weft" preview weave.maps -o x.png --fog 0.5 --fog-g 2
 expect 0 'folds.png' "$weft" preview weave.maps -o folds.png --shape drape --size 60x60 --folds marched --voxels 64 --lamp ball:-40,40,60,9
 expect 0 'walked.png' "$weft" preview weave.maps -o walked.png --shape drape --size 60x60 --folds walked --self-shadow --height-map weave.maps/height.exr
 rm weave.maps/height.exr
