@@ -25,6 +25,8 @@ enum {
 /* A frame that is whole sooner after its trigger than its exposure lasts is of another trigger.  Half of this
  * is what the simulated camera's clock may be off the wall clock. */
 #define EARLY_S 0.1
+/* How long after the exposure a frame that was called behind another one may still come. */
+#define OURS_COMES_S 0.3
 /* The first frame of a stream has taken up to 0.3 s on loopback, and half a second on sleeping cameras. */
 #define FIRST_FRAME_S 3.0
 
@@ -311,18 +313,11 @@ static bool is_uncalled(const aravis_camera *a, ArvBuffer *buffer, double age_s,
 {
     const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
     const uint64_t n = whole ? uncalled(a, arv_buffer_get_frame_id(buffer)) : 0;
-    const double stamp_s = stamp_of(buffer);
-    const double early_s = stamp_s > 0 ? weft_frame_clock_early(&a->clock, stamp_s, a->triggered_s) : 0;
     if (n > 0)
         snprintf(reason, REASON_SIZE,
                  "the camera counts %" PRIu64
                  " frames that nobody asked for: is something else triggering it?",
                  n);
-    else if (early_s > 0)
-        snprintf(reason, REASON_SIZE,
-                 "a frame came that nobody asked for, begun %.0f ms before its trigger: is something else "
-                 "triggering the camera?",
-                 1e3 * early_s);
     else if (age_s < a->set.exposure_s - EARLY_S)
         snprintf(reason, REASON_SIZE,
                  "a frame came that nobody asked for, %.2f s after the trigger of an exposure of %.2f s: is "
@@ -372,42 +367,117 @@ static weft_err fill_mosaic(const aravis_camera *a, ArvBuffer *buffer, weft_mosa
     return WEFT_OK;
 }
 
+/* ---- frames that may be of another trigger ---- */
+
+/* Lets what is under way come.  @param came  a frame did */
+static weft_err wait_for_another(aravis_camera *a, double wait_s, weft_camera_idle_fn *idle,
+                                 void *idle_context, bool *came, weft_error *err)
+{
+    const double end_s = weft_clock_s() + wait_s;
+    *came = false;
+    while (!*came && weft_clock_s() < end_s) {
+        ArvBuffer *const buffer = arv_stream_timeout_pop_buffer(a->stream, SLICE_US);
+        *came = buffer != NULL;
+        if (buffer)
+            arv_stream_push_buffer(a->stream, buffer);
+        WEFT_TRY(check_there(a, err));
+        if (idle)
+            WEFT_TRY(idle(idle_context, err));
+    }
+    return WEFT_OK;
+}
+
+/* How long before its trigger the frame was begun, by the camera's clock; 0 when it was not. */
+static double begun_early(const aravis_camera *a, double stamp_s)
+{
+    return stamp_s > 0 ? weft_frame_clock_early(&a->clock, stamp_s, a->triggered_s) : 0;
+}
+
+/* A frame seems to have been begun before it was called.  Either it is of another trigger, and then ours
+ * comes after it; or the computer was busy each time that the clocks were compared, and this trigger was the
+ * first to be quick: then the clocks are compared anew and the frame is taken again.
+ *
+ * @param stamp_s  the frame's, which counts as a comparison from the second time on
+ * @param tried  how often this frame was doubted before
+ * @param again  take it again; else frame->reason says what is wrong */
+static weft_err settle_doubt(aravis_camera *a, double stamp_s, double early_s, int tried,
+                             weft_camera_idle_fn *idle, void *idle_context, weft_captured_frame *frame,
+                             bool *again, weft_error *err)
+{
+    enum { TRIES = 4 };
+    const double triggered_s = a->triggered_s;
+    const bool by_wire = a->trigger == WEFT_TRIGGER_WIRE; /* nobody would send a second pulse */
+    bool another = false;
+    if (!by_wire)
+        WEFT_TRY(wait_for_another(a, a->set.exposure_s + OURS_COMES_S, idle, idle_context, &another, err));
+    *again = !by_wire && !another && tried < TRIES;
+    if (!*again) {
+        frame->status = WEFT_FRAME_INCOMPLETE;
+        snprintf(frame->reason, sizeof frame->reason,
+                 "a frame came that nobody asked for, begun %.0f ms before its trigger: is something else "
+                 "triggering the camera?",
+                 1e3 * early_s);
+        a->stale = true;
+        return WEFT_OK;
+    }
+    weft_explain("camera %s: a frame seems to be begun %.1f ms before its trigger; comparing the clocks anew",
+                 a->address, 1e3 * early_s);
+    aravis_stop(a);
+    WEFT_TRY(start(a, idle, idle_context, err));
+    if (tried > 0) /* twice in a row: the triggers before were slow */
+        weft_frame_clock_learn(&a->clock, stamp_s, triggered_s);
+    return WEFT_OK;
+}
+
+static weft_err judge(aravis_camera *a, ArvBuffer *buffer, uint64_t n_missing, weft_captured_frame *frame,
+                      weft_error *err)
+{
+    const double age_s = weft_clock_s() - a->triggered_s;
+    frame->status = WEFT_FRAME_INCOMPLETE;
+    frame->sequence = arv_buffer_get_frame_id(buffer);
+    if (is_uncalled(a, buffer, age_s, frame->reason)) {
+        a->stale = true; /* whose frame comes next is not known either */
+        return WEFT_OK;
+    }
+    if (!is_whole(a, buffer, n_missing, frame->reason))
+        return WEFT_OK;
+    frame->status = WEFT_FRAME_COMPLETE;
+    learn_clock(a, buffer);
+    return fill_mosaic(a, buffer, &frame->mosaic, err);
+}
+
 weft_err aravis_expose(void *state, double deadline_s, weft_camera_idle_fn *idle, void *idle_context,
                        weft_captured_frame *frame, weft_error *err)
 {
     aravis_camera *const a = state;
-    ArvBuffer *buffer = NULL;
     WEFT_TRY(check_there(a, err));
     if (a->stale)
         aravis_stop(a);
     if (!a->stream)
         WEFT_TRY(start(a, idle, idle_context, err));
-
     frame->exposure_s = a->set.exposure_s;
     frame->gain = a->set.gain;
-    frame->reason[0] = '\0';
-    const uint64_t missing_before = missing_packets(a);
-    WEFT_TRY(take(a, a->trigger, a->set.exposure_s + deadline_s, idle, idle_context, &buffer, err));
-    if (!buffer) {
-        frame->status = WEFT_FRAME_TIMEOUT;
-        snprintf(frame->reason, sizeof frame->reason, "no frame came within %.1f s after the exposure",
-                 deadline_s);
-        return WEFT_OK;
+    bool again = true;
+    for (int tried = 0; again; tried++) {
+        ArvBuffer *buffer = NULL;
+        const uint64_t missing_before = missing_packets(a);
+        frame->reason[0] = '\0';
+        again = false;
+        WEFT_TRY(take(a, a->trigger, a->set.exposure_s + deadline_s, idle, idle_context, &buffer, err));
+        if (!buffer) {
+            frame->status = WEFT_FRAME_TIMEOUT;
+            snprintf(frame->reason, sizeof frame->reason, "no frame came within %.1f s after the exposure",
+                     deadline_s);
+            return WEFT_OK;
+        }
+        const double stamp_s = stamp_of(buffer), early_s = begun_early(a, stamp_s);
+        const weft_err status =
+            early_s > 0 ? WEFT_OK : judge(a, buffer, missing_packets(a) - missing_before, frame, err);
+        note_id(a, buffer);
+        arv_stream_push_buffer(a->stream, buffer);
+        WEFT_TRY(status);
+        if (early_s > 0)
+            WEFT_TRY(settle_doubt(a, stamp_s, early_s, tried, idle, idle_context, frame, &again, err));
     }
-    weft_err status = WEFT_OK;
-    frame->sequence = arv_buffer_get_frame_id(buffer);
-    const double age_s = weft_clock_s() - a->triggered_s;
-    if (is_uncalled(a, buffer, age_s, frame->reason)) {
-        frame->status = WEFT_FRAME_INCOMPLETE;
-        a->stale = true; /* whose frame comes next is not known either */
-    } else if (is_whole(a, buffer, missing_packets(a) - missing_before, frame->reason)) {
-        frame->status = WEFT_FRAME_COMPLETE;
-        learn_clock(a, buffer);
-        status = fill_mosaic(a, buffer, &frame->mosaic, err);
-    } else {
-        frame->status = WEFT_FRAME_INCOMPLETE;
-    }
-    note_id(a, buffer);
-    arv_stream_push_buffer(a->stream, buffer);
-    return status;
+    return WEFT_OK;
 }

@@ -6,8 +6,9 @@
  * difference between stamp and trigger is close to how the clocks stand (too much by the quickest camera's
  * delay).  A frame whose difference is less was begun before we called it, so something else did.
  *
- * A frame that is less than WEFT_FRAME_CLOCK_SLACK_S early passes: so much may a trigger be quicker than all
- * before it on a busy computer.  Lights are on for longer than that before a trigger.
+ * A frame that is less than WEFT_FRAME_CLOCK_SLACK_S early passes; lights are on for longer than that before
+ * a trigger.  On a busy computer a trigger may be quicker than all that were compared before by more than
+ * this: so an early frame is a doubt, which the caller settles (aravis_stream.c), not a proof.
  */
 #ifndef WEFT_HOST_CAMERA_FRAME_CLOCK_H
 #define WEFT_HOST_CAMERA_FRAME_CLOCK_H

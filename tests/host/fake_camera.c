@@ -5,7 +5,7 @@
  *     fake_camera FORMAT WIDTHxHEIGHT     prints "ready", then obeys lines on stdin:
  *     lost RATIO      drops that share of the stream's packets
  *     delay MS        holds each frame back for so long, as a long exposure does
- *     stray           sends a frame that nobody asked for
+ *     stray           sends a frame that nobody asked for; "ok" when its exposure has begun
  *     format CODE     sends another pixel format (hexadecimal PFNC code) than it was told
  *     quit
  *
@@ -29,7 +29,7 @@ static const struct {
                {"BayerRG14p", 0x010e0106},
                {"BayerGR10p", 0x010a0056}};
 
-static atomic_int delay_ms;
+static atomic_int delay_ms, n_begun;
 
 /* Sample i of `bits` bits behind the ones before it, low bits first (PFNC "p"). */
 static void put_bits(uint8_t *bytes, int i, int bits, unsigned sample)
@@ -46,6 +46,7 @@ static void fill(ArvBuffer *buffer, void *context, guint32 exposure_us, guint32 
     uint8_t *const bytes = (uint8_t *)(uintptr_t)arv_buffer_get_data(buffer, NULL);
     const int width = arv_buffer_get_image_width(buffer), height = arv_buffer_get_image_height(buffer);
     (void)context;
+    atomic_fetch_add(&n_begun, 1);
     g_usleep(1000UL * (unsigned long)atomic_load(&delay_ms));
     for (int i = 0; i < width * height; i++) {
         const uint16_t s = fake_camera_sample(i % width, i / width, exposure_us, gain);
@@ -97,6 +98,15 @@ static char *write_description(const char *format, unsigned code)
     return path;
 }
 
+static void send_stray(ArvGvFakeCamera *camera)
+{
+    const int before = atomic_load(&n_begun);
+    arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera),
+                                   ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
+    for (int i = 0; i < 5000 && atomic_load(&n_begun) == before; i++)
+        g_usleep(1000);
+}
+
 static void obey(ArvGvFakeCamera *camera)
 {
     char line[80];
@@ -109,8 +119,7 @@ static void obey(ArvGvFakeCamera *camera)
         else if (sscanf(line, "delay %d", &ms) == 1)
             atomic_store(&delay_ms, ms);
         else if (strcmp(line, "stray\n") == 0)
-            arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera),
-                                           ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
+            send_stray(camera);
         else if (sscanf(line, "format %x", &format) == 1)
             arv_fake_camera_write_register(arv_gv_fake_camera_get_fake_camera(camera),
                                            ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, format);
