@@ -58,7 +58,9 @@ static weft_environment_share ring(weft_environment_lobe lobe, double alpha, dou
     const double all =
         WEFT_PI * (1.0 / 16 + 0.5 * e / (a * sum) + 0.5 * e * e * (a2 + sum2) / (a2 * a * sum2 * sum));
     double bias = 0;
-    for (double t = a / sum * exp(-REACH); t < exp(REACH); t *= RATIO) {
+    const int steps = (int)ceil((2 * REACH - log(a / sum)) / log(RATIO));
+    double t = a / sum * exp(-REACH);
+    for (int i = 0; i < steps; i++, t *= RATIO) {
         const double t2 = t * t, q = t2 / (1 + t2), lh2 = g + p * q, r = lh2 / (a2 + 4 * p * q);
         bias += r * r * weft_schlick_weight(sqrt(lh2 < 1 ? lh2 : 1)) * t / (1 + t2);
     }
