@@ -60,7 +60,8 @@ weft_err weft_mask_init(weft_mask *mask, int width, int height, uint8_t value, w
     uint8_t *const data = weft_alloc(n, 1, err);
     if (!data)
         return WEFT_ERR_NOMEM;
-    memset(data, value, n);
+    if (value != 0) /* zeroed it is, and not touched where it is in a file */
+        memset(data, value, n);
     *mask = (weft_mask){width, height, data};
     return WEFT_OK;
 }

@@ -1,6 +1,7 @@
 #include "host/solve/cloth_gloss.h"
 
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 /* Blocks of 16 pixels: 3072 pixels determine four numbers to a per cent. */
 enum { COLUMNS = 16, ROWS = 12, MOST = COLUMNS * ROWS };
@@ -30,6 +31,7 @@ static int gather(const weft_solve_plan *plan, const weft_light_plates *plates, 
             if (row >= plates->height || !all_inside(inside, plates->width, row, block))
                 continue;
             weft_light_plates_row(plates, row, in);
+            weft_mem_trim(); /* a block here and there brings its surroundings with it */
             weft_solve_gather(plan, row, block, in, &store[n]);
             blocks[n] = &store[n];
             n++;

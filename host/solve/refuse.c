@@ -4,6 +4,7 @@
 #include "core/colour.h"
 #include "core/linalg.h"
 #include "core/mem.h"
+#include "core/mem_limit.h"
 
 #include <math.h>
 
@@ -90,6 +91,7 @@ static double misfit(const decoding *d, bool decoded)
     for (int j = 0; j < ROWS && n_blocks > 0; j++) {
         const int row = weft_spread_over(d->plates->height, j, ROWS);
         weft_solve_row_in in[WEFT_LIGHTS_MAX];
+        weft_mem_trim();
         weft_light_plates_row(d->plates, row, in);
         if (decoded)
             decode_row(d, in);
