@@ -28,7 +28,7 @@ bool weft_ktx2_is_basisu_size(int width, int height)
 
 static void pad_to(weft_text_buffer *out, size_t alignment)
 {
-    while (out->n % alignment)
+    for (size_t gap = (alignment - out->n % alignment) % alignment; gap > 0; gap--)
         weft_text_add_bytes(out, "", 1);
 }
 
@@ -143,15 +143,23 @@ static weft_err add_level(weft_text_buffer *out, const weft_baked *baked, const 
 
 /* -- the file ----------------------------------------------------------------------------------------- */
 
-/* Header, index, descriptor, key/values, then the levels from the smallest to the largest, each at a multiple
- * of its block (KTX 2.0, section 3). */
-weft_err weft_ktx2_encode(const weft_baked *baked, const weft_channels *channels, weft_ktx2_format format,
-                          weft_text_buffer *out, weft_error *err)
+/* Where the levels lie: the smallest first, each at a multiple of its block. */
+static void plan_levels(const weft_baked *baked, weft_ktx2_format format, int levels, size_t from,
+                        size_t *offsets)
+{
+    const size_t alignment = format == WEFT_KTX2_UASTC ? 16 : 4;
+    for (int level = levels - 1; level >= 0; level--) {
+        offsets[level] = (from + alignment - 1) / alignment * alignment;
+        from = offsets[level] + level_size(baked, level, format);
+    }
+}
+
+/* What stands before the levels: header, their index, descriptor, key/values (KTX 2.0, section 3). */
+static void add_head(weft_text_buffer *out, const weft_baked *baked, const weft_channels *channels,
+                     weft_ktx2_format format, int levels, size_t *offsets)
 {
     static const char identifier[12] = {'\xAB', 'K',    'T',  'X',  ' ',    '2',
                                         '0',    '\xBB', '\r', '\n', '\x1A', '\n'};
-    const int levels = weft_baked_levels(baked->width, baked->height);
-    const size_t alignment = format == WEFT_KTX2_UASTC ? 16 : 4, start = out->n;
     weft_text_buffer descriptor = {0}, pairs = {0};
     add_descriptor(&descriptor, format, channels);
     add_pair(&pairs, "KTXorientation", "rd");
@@ -178,12 +186,7 @@ weft_err weft_ktx2_encode(const weft_baked *baked, const weft_channels *channels
         weft_text_add_le(out, header[i], 4);
     weft_text_add_le(out, 0, 8); /* no supercompression data */
     weft_text_add_le(out, 0, 8);
-    size_t offset = kvd + pairs.n, offsets[WEFT_BAKED_MAX_MIPS];
-    for (int level = levels - 1; level >= 0; level--) {
-        offset = (offset + alignment - 1) / alignment * alignment;
-        offsets[level] = offset;
-        offset += level_size(baked, level, format);
-    }
+    plan_levels(baked, format, levels, kvd + pairs.n, offsets);
     for (int level = 0; level < levels; level++) {
         weft_text_add_le(out, offsets[level], 8);
         weft_text_add_le(out, level_size(baked, level, format), 8);
@@ -191,15 +194,25 @@ weft_err weft_ktx2_encode(const weft_baked *baked, const weft_channels *channels
     }
     weft_text_add_bytes(out, descriptor.text, descriptor.n);
     weft_text_add_bytes(out, pairs.text, pairs.n);
-    weft_err status = weft_text_buffer_status(&descriptor, err);
-    if (status == WEFT_OK)
-        status = weft_text_buffer_status(&pairs, err);
-    for (int level = levels - 1; level >= 0 && status == WEFT_OK; level--) {
-        while ((out->n - start) % alignment)
-            weft_text_add_bytes(out, "", 1);
-        status = add_level(out, baked, channels, format, level, err);
-    }
+    if (!out->failure.code && (descriptor.failure.code || pairs.failure.code))
+        out->failure = descriptor.failure.code ? descriptor.failure : pairs.failure;
     weft_text_buffer_fini(&descriptor);
     weft_text_buffer_fini(&pairs);
-    return status == WEFT_OK ? weft_text_buffer_status(out, err) : status;
+}
+
+weft_err weft_ktx2_encode(const weft_baked *baked, const weft_channels *channels, weft_ktx2_format format,
+                          weft_text_buffer *out, weft_error *err)
+{
+    const int levels = weft_baked_levels(baked->width, baked->height);
+    const size_t start = out->n;
+    size_t offsets[WEFT_BAKED_MAX_MIPS];
+    add_head(out, baked, channels, format, levels, offsets);
+    WEFT_TRY(weft_text_buffer_status(out, err));
+    for (int level = levels - 1; level >= 0; level--) {
+        for (size_t gap = start + offsets[level] - out->n; gap > 0; gap--)
+            weft_text_add_bytes(out, "", 1);
+        WEFT_TRY(add_level(out, baked, channels, format, level, err));
+        WEFT_TRY(weft_text_buffer_status(out, err));
+    }
+    return WEFT_OK;
 }
