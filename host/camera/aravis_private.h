@@ -60,6 +60,12 @@ weft_err aravis_set_exposure(const aravis_camera *a, double exposure_s, double *
 /** Sets the source of the trigger and reads it back. */
 weft_err aravis_set_trigger_source(aravis_camera *a, const char *source, weft_error *err);
 
+/** How long a silent camera is asked whether it lives, ending with the deadline. */
+#define ARAVIS_PING_S 1.2
+/** Whether a GigE Vision camera answers a READREG (GigE Vision 2.0, section 17) on a socket of our own:
+ *  Aravis' own reads stand in line behind its heartbeat, which waits for seconds when the camera is gone. */
+bool aravis_answers(const char *address);
+
 /** What is wrong with a frame of this status, and the remedy; "" for a whole one. */
 const char *aravis_status_words(ArvBufferStatus status);
 

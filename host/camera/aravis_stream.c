@@ -8,9 +8,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <sys/time.h>
-#include <unistd.h>
 
 enum {
     N_BUFFERS = 4,
@@ -18,10 +15,6 @@ enum {
     REASON_SIZE = sizeof((weft_captured_frame *)0)->reason,
 };
 
-#define GVCP_PORT 3956
-/* How long a silent camera is asked whether it lives, ending with the deadline. */
-#define PING_S     1.2
-#define PING_TRIES 3
 /* A frame that is whole sooner after its trigger than its exposure lasts is of another trigger.  Half of this
  * is what the simulated camera's clock may be off the wall clock. */
 #define EARLY_S 0.1
@@ -101,33 +94,11 @@ static weft_err check_there(const aravis_camera *a, weft_error *err)
     return WEFT_OK;
 }
 
-/* Whether a GigE Vision camera answers a READREG (GigE Vision 2.0, section 17) on a socket of our own:
- * Aravis' own reads stand in line behind its heartbeat, which waits for seconds when the camera is gone. */
-static bool answers(const char *address)
-{
-    static const uint8_t read_privilege[12] = {0x42, 0x01, 0x00, 0x80, 0x00, 0x04, 0x77, 0x65, 0, 0, 0x0a, 0};
-    const struct sockaddr_in to = {
-        .sin_family = AF_INET, .sin_port = htons(GVCP_PORT), .sin_addr.s_addr = inet_addr(address)};
-    const struct timeval wait = {.tv_usec = (suseconds_t)(1e6 * PING_S / PING_TRIES)};
-    uint8_t reply[64];
-    bool answered = false;
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd < 0 || connect(fd, (const struct sockaddr *)&to, sizeof to) != 0 ||
-        setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait) != 0)
-        answered = true; /* nothing is known: let the deadline decide */
-    for (int i = 0; i < PING_TRIES && !answered; i++)
-        answered = send(fd, read_privilege, sizeof read_privilege, 0) > 0 &&
-                   recv(fd, reply, sizeof reply, 0) >= 8 && reply[2] == 0 && reply[3] == 0x81;
-    if (fd >= 0)
-        close(fd);
-    return answered;
-}
-
 static weft_err ping(aravis_camera *a, weft_error *err)
 {
     struct in_addr unused;
     if (inet_pton(AF_INET, a->address, &unused) == 1) {
-        if (!answers(a->address))
+        if (!aravis_answers(a->address))
             atomic_store(&a->lost, true);
         return check_there(a, err);
     }
@@ -158,8 +129,9 @@ static weft_err take(aravis_camera *a, weft_camera_trigger how, double wait_s, w
         arv_stream_push_buffer(a->stream, old);
     WEFT_TRY(check_there(a, err));
     WEFT_TRY(trigger(a, how, idle, idle_context, err));
-    const double start_s = weft_clock_s(), ping_after_s = wait_s - PING_S;
-    bool pinged = ping_after_s < a->set.exposure_s + PING_S; /* no time for it: a short deadline is enough */
+    const double start_s = weft_clock_s(), ping_after_s = wait_s - ARAVIS_PING_S;
+    bool pinged =
+        ping_after_s < a->set.exposure_s + ARAVIS_PING_S; /* no time for it: a short deadline is enough */
     for (double elapsed_s = 0; !*buffer && elapsed_s < wait_s; elapsed_s = weft_clock_s() - start_s) {
         *buffer = arv_stream_timeout_pop_buffer(a->stream, SLICE_US);
         if (*buffer)
@@ -272,31 +244,6 @@ static weft_err start(aravis_camera *a, weft_camera_idle_fn *idle, void *idle_co
         "camera %s: answers, but none of its frames arrives; let a firewall pass UDP from it, and "
         "check that it has an address of this network",
         a->address);
-}
-
-const char *aravis_status_words(ArvBufferStatus status)
-{
-    static const struct {
-        ArvBufferStatus status;
-        const char *words;
-    } rows[] = {
-        {ARV_BUFFER_STATUS_SUCCESS, ""},
-        {ARV_BUFFER_STATUS_CLEARED, "it was not filled; if this repeats, switch the camera off and on"},
-        {ARV_BUFFER_STATUS_TIMEOUT,
-         "the rest of it did not come in time; raise net.core.rmem_max, use jumbo frames and a good cable"},
-        {ARV_BUFFER_STATUS_MISSING_PACKETS,
-         "packets were lost; raise net.core.rmem_max, use jumbo frames, keep other traffic away"},
-        {ARV_BUFFER_STATUS_WRONG_PACKET_ID,
-         "packets came with wrong numbers; look for a second program that reads this camera"},
-        {ARV_BUFFER_STATUS_SIZE_MISMATCH,
-         "it is larger than agreed; another program has changed the camera's settings"},
-        {ARV_BUFFER_STATUS_FILLING, "it was still being filled; the computer is too slow for this rate"},
-        {ARV_BUFFER_STATUS_ABORTED, "the stream was stopped; check the camera's cable and power"},
-    };
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
-        if (rows[i].status == status)
-            return rows[i].words;
-    return "its status is not known; the camera or Aravis is newer than this program";
 }
 
 static uint64_t missing_packets(const aravis_camera *a)
