@@ -25,8 +25,8 @@ static inline int weft_parallel_n_bands(int n_rows)
 /** Runs `fn` over all bands of [0, n_rows) and returns when all are done. */
 void weft_parallel_rows(int n_rows, weft_rows_fn *fn, void *context);
 
-/** As weft_parallel_rows(), showing progress and stopping when cancelled; both are looked at between bands, about
- *  twenty times a second where bands are quick. */
+/** As weft_parallel_rows(), showing progress and stopping when cancelled; both are looked at between bands,
+ * about twenty times a second where bands are quick. */
 weft_err weft_parallel_rows_progress(int n_rows, weft_rows_fn *fn, void *context, const char *what,
                                      weft_error *err);
 

@@ -11,10 +11,10 @@
  * counts: were each value weighted by itself, dark outliers would count more.
  *
  * A value counts when neither its photosite nor a neighbour is saturated, and when it lies below 95 % of the
- * range, where sensors begin to bend.  Which side of that it is on is judged by its mean with the next shorter
- * exposure, weighted as in the merge: whatever that mean is, the shorter exposures differ from it by noise of
- * their own, so leaving the longer one out is no bias.  (Judged by the value itself just the dark half of the
- * noise would stay: -0.2 % at 30000 electrons; by the shorter exposure the other half: +0.3 %.)
+ * range, where sensors begin to bend.  Which side of that it is on is judged by its mean with the next
+ * shorter exposure, weighted as in the merge: whatever that mean is, the shorter exposures differ from it by
+ * noise of their own, so leaving the longer one out is no bias.  (Judged by the value itself just the dark
+ * half of the noise would stay: -0.2 % at 30000 electrons; by the shorter exposure the other half: +0.3 %.)
  */
 #ifndef WEFT_HOST_SET_BRACKET_H
 #define WEFT_HOST_SET_BRACKET_H

@@ -2,7 +2,8 @@
  * Plates: the linear light of a set, ready for computing.
  *
  * A plate is what one light alone put on the sensor: (DN - black) / (white - black) / exposure_s / gain,
- * brackets merged by noise (bracket.h), the ambient plate subtracted.  Two exposures of one scene give the same plate.
+ * brackets merged by noise (bracket.h), the ambient plate subtracted.  Two exposures of one scene give the
+ * same plate.
  */
 #ifndef WEFT_HOST_SET_PLATE_H
 #define WEFT_HOST_SET_PLATE_H

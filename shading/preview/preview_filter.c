@@ -144,8 +144,8 @@ static void place_taps(const weft_preview_setup *setup, const weft_preview_sampl
     }
 }
 
-/* Eight channels at once: gcc makes no vector code of the plain loop that widens 16 bits to floats, and with it
- * whole pictures took 1.4 (plane) to 1.7 times (ball) as long. */
+/* Eight channels at once: gcc makes no vector code of the plain loop that widens 16 bits to floats, and with
+ * it whole pictures took 1.4 (plane) to 1.7 times (ball) as long. */
 typedef int16_t packed8 __attribute__((vector_size(16)));
 typedef int32_t wide8 __attribute__((vector_size(32)));
 typedef float float8 __attribute__((vector_size(32)));

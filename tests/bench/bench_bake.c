@@ -9,6 +9,7 @@
 #include "core/formats/png_file.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/text.h"
 #include "host/cli/scan_input.h"
 #include "host/set/maps.h"
 #include "shading/bake/material_file.h"
@@ -233,9 +234,9 @@ static void write_peer_inputs(int side)
 
 int main(int argc, char **argv)
 {
-    const int side = argc > 1 ? atoi(argv[1]) : 4096;
+    int side = 4096;
     char folder[] = "/tmp/weft-bench-XXXXXX";
-    if (side < 64 || side > 16384 || !mkdtemp(folder) || chdir(folder) != 0) {
+    if ((argc > 1 && !weft_text_to_int(argv[1], &side)) || side < 64 || side > 16384 || !mkdtemp(folder) || chdir(folder) != 0) {
         fprintf(stderr, "bench_bake: give a side of 64 to 16384; /tmp must be writable\n");
         return 1;
     }

@@ -193,8 +193,8 @@ static void test_frames(void **state)
     static const struct {
         weft_preview_shape shape;
         double fov_deg, step;
-    } rows[] = {{WEFT_PREVIEW_PLANE, 0, 0},      {WEFT_PREVIEW_PLANE, 0, 0.002},
-                {WEFT_PREVIEW_SPHERE, 0, 0},     {WEFT_PREVIEW_SPHERE, 0, 0.005},
+    } rows[] = {{WEFT_PREVIEW_PLANE, 0, 0},       {WEFT_PREVIEW_PLANE, 0, 0.002},
+                {WEFT_PREVIEW_SPHERE, 0, 0},      {WEFT_PREVIEW_SPHERE, 0, 0.005},
                 {WEFT_PREVIEW_SPHERE, 40, 0.005}, {WEFT_PREVIEW_CYLINDER, 0, 0.005}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         double flicker[2], wrong[2];
