@@ -18,7 +18,7 @@ static weft_raster picture_of(int frame)
     assert_ok(weft_raster_init(&picture, WIDTH, HEIGHT, 3, 8, err));
     for (int y = 0; y < HEIGHT; y++)
         for (int x = 0; x < WIDTH; x++) {
-            uint16_t *const p = picture.data + 3 * (y * WIDTH + x);
+            uint16_t *const p = picture.data + 3 * ((size_t)y * WIDTH + (size_t)x);
             p[0] = (uint16_t)((x * 5 + frame * 9) % 256);
             p[1] = (uint16_t)(y * 11 % 256);
             p[2] = (uint16_t)(255 - 4 * x);

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { WIDE = 160, HIGH = 24, WALL = 110 };
+enum { WIDE = 160, HIGH = 16, WALL = 110 };
 
 /* A wall 20 texels high, from WALL on. */
 static weft_image wall_height(void)
@@ -68,7 +68,7 @@ static weft_preview_view wall_view(double disc_rad)
     view.width = WIDE;
     view.height = HIGH;
     view.shadows.relief = true;
-    view.shadows.steps = 256;
+    view.shadows.steps = 96;
     view.shadows.disc_rad = disc_rad;
     weft_preview_direction(0, 30, view.lights[0].direction);
     return view;

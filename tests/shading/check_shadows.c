@@ -96,10 +96,12 @@ static void test_wall(void **state)
     const double light[3] = {cos(WEFT_PI / 6), 0, sin(WEFT_PI / 6)}; /* from the right, 30 degrees */
     /* from the foot at x the ray is sqrt(1/3) (120 - x) high at the ridge */
     const double edge = 120 - 20 * sqrt(3);
-    for (double x = 1; x < 118; x += 0.37)
+    for (int k = 0; k < 316; k++) {
+        const double x = 1 + 0.37 * k;
         if (fabs(x - edge) > 0.6)
             assert_int_equal(
                 weft_height_field_look(&field, x, 1.5, light, (weft_height_march){4000, 0.5}).lit, x < edge);
+    }
     assert_true(weft_height_field_look(&field, 145, 1.5, light, (weft_height_march){4000, 0.5}).lit);
     weft_height_field_mirror(&field, 0, 0, WIDE, 4);
     /* the next wall to the right is the mirrored one from 199.5 + 60 on */
@@ -203,14 +205,14 @@ static void test_relief_against_every_step(void **state)
     const bool all = getenv("WEFT_TEST_LONG");
     weft_image height = weave_height();
     for (int size = SIDE; size <= (all ? 4 : 1) * SIDE; size *= 2)
-        for (double elevation = 15; elevation < (all ? 40 : 20); elevation += 20) {
+        for (int elevation = 15; elevation < (all ? 40 : 20); elevation += 20) {
             double light[3], lit = 0;
             difference d[3];
             weft_preview_direction(30, elevation, light);
             true_shares(&height, light, size, truth);
             for (int i = 0; i < size * size; i++)
                 lit += (double)truth[i] / (size * size);
-            print_message("%2.0f degrees, %d px a texel, %.3f lit: never, where coarse, always blurred\n",
+            print_message("%d degrees, %d px a texel, %.3f lit: never, where coarse, always blurred\n",
                           elevation, size / SIDE, lit);
             for (int steps = 4; steps <= 64; steps *= all ? 2 : 4) {
                 measure(&height, light, size, steps, truth, d);
@@ -262,14 +264,15 @@ static void test_large_lamp(void **state)
     view.lights[0] = (weft_preview_light){
         .kind = WEFT_PREVIEW_BALL, .position_mm = {150, 40, 70}, .radius_mm = 25, .irradiance = {1, 1, 1}};
     for (int at = 0; at < SIDE * SIDE; at++) {
+        const int row = at / SIDE, column = at % SIDE;
         double lit = 0, all = 0;
-        one.position_mm[0][0] = (float)(at % SIDE * MM_PER_PX);
-        one.position_mm[1][0] = (float)(-(at / SIDE) * MM_PER_PX);
+        one.position_mm[0][0] = (float)(column * MM_PER_PX);
+        one.position_mm[1][0] = (float)(-row * MM_PER_PX);
         for (int k = 0; k < WEFT_PREVIEW_AREA_POINTS; k++) {
             weft_preview_aim(&view.lights[0], &one, 0, k);
             const double to[3] = {(double)one.lamp[0][0], (double)one.lamp[1][0], (double)one.lamp[2][0]};
             all += (double)one.irradiance[0] * to[2];
-            lit += truly_lit(&height, at % SIDE, at / SIDE, to) ? (double)one.irradiance[0] * to[2] : 0;
+            lit += truly_lit(&height, column, row, to) ? (double)one.irradiance[0] * to[2] : 0;
         }
         truth[at] = (float)(lit / all);
     }
@@ -295,7 +298,7 @@ static void test_large_lamp(void **state)
 
 /* ---- the folds ---- */
 
-enum { MESH = 160 };
+enum { MESH = 120 };
 
 static double vertices[MESH + 1][MESH + 1][3];
 
@@ -410,7 +413,7 @@ static void test_voxels_against_the_mesh(void **state)
                       across, (double)walked / n, (double)marched[0] / n, (double)marched[1] / n,
                       (double)marched[2] / n, steps[0], steps[1], steps[2]);
         assert_true(walked <= 2 * n / across + 1);
-        assert_true(marched[1] <= 2.5 * n / across + 1 && marched[0] <= 5.0 * n / across + 1);
+        assert_true(marched[1] <= 2.5 * n / across + 1 && marched[0] <= 6.0 * n / across + 1);
         weft_voxels_fini(&voxels);
     }
 }
