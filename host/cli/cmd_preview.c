@@ -582,7 +582,7 @@ const weft_command weft_cmd_preview = {
         "INPUT is a folder of solved maps (NAME.maps) or a baked material (NAME.material); without it a "
         "smooth\n"
         "surface is shown, of which a ball has a radius of 50 mm.  The albedo map is the model's albedo; a\n"
-        "material gives f0, alpha and tints too, from the mip that fits.  Other parameters are constants "
+        "material gives f0, alpha and tints too, from its mips.  Other parameters are constants "
         "unless\n"
         "a picture of the same size is given for them.  Positions of lamps are in mm, from the world's "
         "origin\n"

@@ -20,6 +20,23 @@ expect 0 '"width":64' "$weft" preview weave.maps/ -o ball.png --json --shape sph
     --size 64x48 --fov 20 --light 60,20
 is_png ball.png 64 48
 expect 0 'point.exr' "$weft" preview weave.maps -o point.exr --light-mm=-20,0,40 --brdf ggx --param alpha=weave.maps/confidence.exr
+expect 2 '1 to 16' "$weft" preview weave.maps -o never.png --taps 17
+expect 2 'samples|trilinear' "$weft" preview weave.maps -o never.png --filter bilinear
+[ ! -e never.png ]
+
+# a material's mips, eight texels a pixel: every filter; those that look at mips are alike here, level 0 is not
+echo ':cloth := ( opaquematerial :scan = "weave.maps" )' >cloth.radattr
+"$weft" bake cloth.radattr -o cloth.material >bake.log 2>&1
+for filter in samples trilinear anisotropic; do
+    expect 0 "cloth-$filter.png: 50 x 38, ggx" "$weft" preview cloth.material -o "cloth-$filter.png" --brdf ggx --size 50x38 --filter "$filter" --draft
+    is_png "cloth-$filter.png" 50 38
+done
+cmp cloth-trilinear.png cloth-anisotropic.png
+if cmp -s cloth-samples.png cloth-anisotropic.png; then
+    echo "FAILED: --filter makes no difference"
+    exit 1
+fi
+
 expect 0 'sheet.png: 672 x ' "$weft" contact weave.maps sensor.maps -o sheet.png --tile 120x80
 
 # a captured set of three small mosaics: the red light is twice as bright as the other, which must stay visible
