@@ -236,7 +236,8 @@ int main(int argc, char **argv)
 {
     int side = 4096;
     char folder[] = "/tmp/weft-bench-XXXXXX";
-    if ((argc > 1 && !weft_text_to_int(argv[1], &side)) || side < 64 || side > 16384 || !mkdtemp(folder) || chdir(folder) != 0) {
+    if ((argc > 1 && !weft_text_to_int(argv[1], &side)) || side < 64 || side > 16384 || !mkdtemp(folder) ||
+        chdir(folder) != 0) {
         fprintf(stderr, "bench_bake: give a side of 64 to 16384; /tmp must be writable\n");
         return 1;
     }
