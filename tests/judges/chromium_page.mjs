@@ -20,7 +20,10 @@ export function showPage(page, { three, files = {}, minutes = 4 }, hear) {
     function finish(status, text) {
         if (text) console.log(text);
         browser.removeAllListeners('exit');
-        browser.once('exit', () => { fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 }); process.exit(status); });
+        browser.once('exit', () => {
+            try { fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 }); } catch { /* a last helper still writes there */ }
+            process.exit(status);
+        });
         try { process.kill(-browser.pid, 'SIGKILL'); } catch { process.exit(status); }
     }
     function take(what, body) {
