@@ -1,9 +1,9 @@
 /**
  * Chains of mips that keep what the eye sees from afar: normals that are averaged become roughness.
  *
- * Every level is made from level 0 of the maps in floating point, with the areas of the texels as weights (so
- * that sizes need not be powers of two); colours, F0, opacity and the rest are averaged, normals and
- * roughness filtered together by one of the rules below.
+ * Every level is made from level 0 of the maps in floating point (S-ORD-23), with the areas of the texels as
+ * weights (so that sizes need not be powers of two); colours, F0, opacity and the rest are averaged, normals
+ * and roughness filtered together by one of the rules below.
  */
 #ifndef WEFT_SHADING_BAKE_MIPS_H
 #define WEFT_SHADING_BAKE_MIPS_H

@@ -44,7 +44,7 @@ static inline void weft_sample_ggx_visible(const double v[3], double at, double 
 }
 
 /** Cosine n.h of a GGX normal with density D(h) (n.h), from u in [0, 1):
- *  sqrt((1 - u)/(1 + (alpha^2 - 1) u)).  Source: Walter et al. 2007 eq. 35; S-UE4-06. */
+ *  sqrt((1 - u)/(1 + (alpha^2 - 1) u)).  Source: Walter et al. 2007 eq. 35; S-UE4-06, S-COD-02. */
 static inline double weft_sample_ggx_cosine(double alpha, double u)
 {
     return sqrt((1 - u) / (1 + (alpha * alpha - 1) * u));
