@@ -118,7 +118,7 @@ weft_err weft_maps_find_alpha(weft_maps *maps, double ground, weft_error *err)
         status = weft_flaw_quantile(&job.luminance, &job.closed, dark_yarns, &job.dark, err);
     }
     if (status == WEFT_OK) {
-        mark_edges(&job, job.ground + (float)way_to_dark * (job.dark - job.ground));
+        mark_edges(&job, fminf(sure_of(&job), job.ground + (float)way_to_dark * (job.dark - job.ground)));
         status = find_yarn(&job, err); /* without the edges, which are dimmer */
     }
     if (status == WEFT_OK)

@@ -10,6 +10,8 @@ enum { PATTERN_HOLES = 50, GROWN = 1 };
 
 /* A tear in a net is larger than so many of its holes; a thread too thin to see joins two or three. */
 static const double usual_holes = 6;
+/* Fewer holes than this part of the picture are flecks of yarn as dark as the ground, and no net. */
+static const double pattern_share = 0.05;
 
 static int compare_floats(const void *a, const void *b)
 {
@@ -67,6 +69,7 @@ weft_err weft_flaw_find_tears(weft_flaw_search *s, bool *pattern, weft_error *er
 {
     const weft_maps *const m = s->maps;
     const double mm2 = m->mm_per_px * m->mm_per_px;
+    double open = 0;
     holes h = {.room = (size_t)m->width * (size_t)m->height / 8 + 1};
     if (!(h.areas = weft_alloc(h.room, sizeof *h.areas, err)))
         return WEFT_ERR_NOMEM;
@@ -74,7 +77,9 @@ weft_err weft_flaw_find_tears(weft_flaw_search *s, bool *pattern, weft_error *er
     weft_err status = weft_components_keep(&s->marks, count_hole, &h, err);
     if (status == WEFT_OK) {
         qsort(h.areas, h.n, sizeof *h.areas, compare_floats);
-        *pattern = h.n >= PATTERN_HOLES;
+        for (size_t i = 0; i < h.n; i++)
+            open += (double)h.areas[i];
+        *pattern = h.n >= PATTERN_HOLES && open > pattern_share * m->width * m->height;
         mark_holes(m, &s->marks);
         s->least_mm = 1.5;
         s->least_width_mm = WEFT_FLAW_THREAD_MM;
