@@ -90,7 +90,7 @@ static bool stands_out(const spectrum *s, int axis, int peak_f, int peak_o)
 {
     const int n = axis ? s->h : s->w, across = axis ? s->w : s->h,
               reach = (int)(AXIS_SLOPE * peak_f * across / n) + 3;
-    const int last = (int)fmin(1.4 * peak_f + 4, n / 2 - 1);
+    const int highest = n / 2 - 1, last = (int)fmin(1.4 * peak_f + 4, highest);
     double sum = 0;
     int count = 0;
     for (int f = (int)fmax(0.7 * peak_f - 4, 2); f <= last; f++)
