@@ -403,6 +403,74 @@ static void test_even_surroundings(void **state)
     weft_image_fini(&white);
 }
 
+/* A room with a bright window on one side and a floor half as bright as the rest. */
+static double room(const double d[3])
+{
+    const double window = 0.6 * d[0] + 0.3 * d[1] + 0.7416198487 * d[2];
+    return (window > 0.9 ? 12 : 1) * (d[2] < 0 ? 0.5 : 1);
+}
+
+/* f n.l L over the whole hemisphere, by the middle of 200 x 400 cells even in cosine. */
+static double reflected(const weft_preview_surface *surface, const double frame[3][3], const double view[3])
+{
+    double sum = 0, local[3];
+    for (int c = 0; c < 3; c++)
+        local[c] = frame[c][0] * view[0] + frame[c][1] * view[1] + frame[c][2] * view[2];
+    for (int i = 0; i < 200; i++)
+        for (int k = 0; k < 400; k++) {
+            double l[3], value[3], world[3];
+            weft_brdf_direction((i + 0.5) / 200, 2 * 3.141592653589793 * (k + 0.5) / 400, l);
+            for (int c = 0; c < 3; c++)
+                world[c] = l[0] * frame[0][c] + l[1] * frame[1][c] + l[2] * frame[2][c];
+            weft_brdf_eval_one(surface->brdf, surface->params, l, local, value);
+            sum += value[0] * l[2] * room(world) * 2 * 3.141592653589793 / (200 * 400);
+        }
+    return sum;
+}
+
+/* Cloth and the like in a room that three bands cannot hold. */
+static void test_room_on_cloth(void **state)
+{
+    (void)state;
+    static weft_environment_table table;
+    static const char *const models[] = {"cloth", "cloth-two-tone", "charlie", "lambert"};
+    weft_image panorama;
+    weft_environment_map map;
+    double mean = 0;
+    assert_ok(weft_image_init(&panorama, 256, 128, 1, err));
+    for (int y = 0; y < 128; y++)
+        for (int x = 0; x < 256; x++) {
+            const double up = (0.5 - (y + 0.5) / 128) * 3.141592653589793,
+                         round = (x - 127.5) / 256 * 2 * 3.141592653589793;
+            const double d[3] = {cos(up) * sin(round), cos(up) * cos(round), sin(up)};
+            weft_image_row(&panorama, 0, y)[x] = (float)room(d);
+        }
+    assert_ok(weft_environment_map_init(&map, &panorama, err));
+    for (int m = 0; m < 4; m++)
+        for (int tilt = 0; tilt < 4; tilt++) {
+            weft_preview_surface surface = surface_of(models[m], 8, 8);
+            weft_preview_view view = view_of(8, 8, 0, 90);
+            const double angle = 0.4 * tilt - 0.4, n[3] = {sin(angle), 0, cos(angle)};
+            weft_image normal = constant_image(8, 8, n[0], n[1], n[2]), picture;
+            const double frame[3][3] = {{n[2], 0, -n[0]}, {0, 1, 0}, {n[0], n[1], n[2]}}, up[3] = {0, 0, 1};
+            surface.normal = &normal;
+            view.n_lights = 0;
+            view.surroundings = (weft_preview_surroundings){&map, &table, 1};
+            assert_ok(weft_preview_render(&surface, &view, &picture, err));
+            const double wanted = reflected(&surface, frame, up);
+            print_message("%s tilted %.1f: %.4f, whole hemisphere %.4f\n", models[m], angle,
+                          pixel(&picture, 0, 4, 4), wanted);
+            const double off = fabs(pixel(&picture, 0, 4, 4) / wanted - 1);
+            assert_true(off < 0.12);
+            mean += off / 16;
+            weft_image_fini(&picture);
+            weft_image_fini(&normal);
+        }
+    assert_true(mean < 0.025);
+    weft_environment_map_fini(&map);
+    weft_image_fini(&panorama);
+}
+
 /* The roll and the drape face the viewer where they are flat: n.l from there. */
 static void test_roll_and_drape(void **state)
 {
@@ -493,6 +561,7 @@ int main(void)
         cmocka_unit_test(test_area_lights),
         cmocka_unit_test(test_representative_point),
         cmocka_unit_test(test_even_surroundings),
+        cmocka_unit_test(test_room_on_cloth),
         cmocka_unit_test(test_roll_and_drape),
         cmocka_unit_test(test_draft),
         cmocka_unit_test(test_tone_curves),
