@@ -2,7 +2,7 @@
 # Draws the gallery: gallery.sh WEFT FOLDER.  A page a model with lobes, slice and spheres, and the figures
 # of the sources rendered for the same situations.
 set -euo pipefail
-weft=$1 to=$2
+weft=$(realpath "$1") to=$2
 cd "$to"
 
 quiet() { "$weft" "$@" --force >/dev/null; }
