@@ -6,7 +6,9 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/daemon/child.h"
+#include "host/daemon/job_holds.h"
 #include "host/daemon/job_kinds.h"
+#include "host/daemon/job_order.h"
 #include "host/daemon/job_request.h"
 #include "host/daemon/job_words.h"
 #include "host/library/catalogue.h"
@@ -19,14 +21,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum {
-    MAX_RUNNING = 17,
-    MAX_HOLDS = 64,
-    MAX_LOG_LINES = 2000,
-    MAX_ATTEMPTS = 100,
-    CPU_NICENESS = 5,
-    KEEP_JOBS = 2000
-};
+enum { MAX_RUNNING = 17, MAX_LOG_LINES = 2000, MAX_ATTEMPTS = 100, CPU_NICENESS = 5, KEEP_JOBS = 2000 };
 #define GRACE_S 10.0 /* between the request to end and SIGKILL */
 #define HOLD_S  5.0  /* for the one who wants to hold a job to come */
 
@@ -47,13 +42,6 @@ typedef struct running_job {
     char end_error[1024];
 } running_job;
 
-/* A job that lives as long as somebody holds it. */
-typedef struct held_job {
-    int64_t id; /* 0: free */
-    int holders;
-    double since_s; /* when it was left alone */
-} held_job;
-
 struct weft_queue {
     weft_queue_options options;
     weft_loop *loop;
@@ -61,7 +49,7 @@ struct weft_queue {
     weft_events *events;
     weft_live *live;
     running_job running[MAX_RUNNING];
-    held_job held[MAX_HOLDS];
+    weft_job_holds holds;
     bool stopping, look; /* look: something has changed that may let a job begin */
     double looked_s;
 };
@@ -109,23 +97,6 @@ static running_job *find_running(const weft_queue *queue, int64_t id)
         if (queue->running[i].queue && queue->running[i].job.id == id)
             return (running_job *)(uintptr_t)&queue->running[i];
     return NULL;
-}
-
-static held_job *find_held(weft_queue *queue, int64_t id)
-{
-    for (int i = 0; i < MAX_HOLDS; i++)
-        if (queue->held[i].id == id)
-            return &queue->held[i];
-    return NULL;
-}
-
-/* The job begins when somebody holds it; false when too many are held. */
-static bool expect_holder(weft_queue *queue, int64_t id)
-{
-    held_job *const held = find_held(queue, 0);
-    if (held)
-        *held = (held_job){.id = id, .since_s = weft_clock_s()};
-    return held != NULL;
 }
 
 int weft_queue_running(const weft_queue *queue)
@@ -264,9 +235,7 @@ static void store_end(running_job *r)
         weft_warn("job %" PRId64 ": its end cannot be stored yet: %s", id, error.text);
         return;
     }
-    held_job *const held = find_held(queue, id);
-    if (held)
-        *held = (held_job){0};
+    weft_job_holds_drop(&queue->holds, id);
     free_slot(r);
     tell_state(queue, id);
     queue->look = true;
@@ -361,42 +330,12 @@ typedef struct survey {
     int n_waiting;
 } survey;
 
-/* Whether a path is the other, or lies in it. */
-static bool is_in(const char *path, const char *folder)
-{
-    const size_t n = strlen(folder);
-    return strncmp(path, folder, n) == 0 && (path[n] == '/' || path[n] == '\0');
-}
-
-/* Whether a path of `works` is one of `paths`, or the folder that it lies in. */
-static bool holds(const json_t *works, const json_t *paths)
-{
-    for (size_t i = 0; i < json_array_size(works); i++)
-        for (size_t j = 0; j < json_array_size(paths); j++)
-            if (is_in(json_string_value(json_array_get(paths, j)),
-                      json_string_value(json_array_get(works, i))))
-                return true;
-    return false;
-}
-
-/* Whether an earlier job makes what this one needs or makes, or needs what this one makes, or is to be waited
- * for.  (A job that looks at a folder does not wait for all that is made in it: the library would stand
- * still while it is indexed.) */
-static bool conflicts(const survey *s, const weft_job *job)
-{
-    for (int i = 0; i < s->n_earlier; i++) {
-        const weft_job *const e = s->earlier[i];
-        if (holds(e->writes, job->reads) || holds(e->writes, job->writes) || holds(job->writes, e->writes) ||
-            holds(job->writes, e->reads) || weft_job_request_is_after(job->request, e->id))
-            return true;
-    }
-    return false;
-}
-
 static bool must_wait(const survey *s, const weft_job *job)
 {
-    held_job *const held = find_held(s->queue, job->id);
-    if ((held && held->holders == 0) || conflicts(s, job))
+    for (int i = 0; i < s->n_earlier; i++)
+        if (weft_job_follows(job, s->earlier[i]))
+            return true;
+    if (weft_job_holds_wait(&s->queue->holds, job->id))
         return true;
     return job->hardware ? s->n_hardware > 0 || s->hardware_waits : s->n_cpu >= s->queue->options.cpu_jobs;
 }
@@ -435,8 +374,7 @@ static void start_what_can(weft_queue *queue)
         weft_job *const job = &s->waiting[i];
         const bool hardware = job->hardware;
         if (must_wait(s, job)) {
-            const held_job *const held = find_held(queue, job->id);
-            if (!held || held->holders > 0)
+            if (!weft_job_holds_wait(&queue->holds, job->id))
                 s->hardware_waits |= hardware;
             if (s->n_earlier < 256)
                 s->earlier[s->n_earlier++] = job;
@@ -456,14 +394,8 @@ static void start_what_can(weft_queue *queue)
 
 static void let_go_of_the_forgotten(weft_queue *queue, double now_s)
 {
-    for (int i = 0; i < MAX_HOLDS; i++) {
-        held_job *const h = &queue->held[i];
-        if (h->id && h->holders == 0 && now_s - h->since_s > HOLD_S) {
-            const int64_t id = h->id;
-            *h = (held_job){0};
-            weft_queue_cancel(queue, id, NULL);
-        }
-    }
+    for (int64_t id; (id = weft_job_holds_take_forgotten(&queue->holds, now_s, HOLD_S)) > 0;)
+        weft_queue_cancel(queue, id, NULL);
 }
 
 void weft_queue_tick(weft_queue *queue)
@@ -489,16 +421,16 @@ void weft_queue_tick(weft_queue *queue)
 
 static weft_err too_many_held(weft_error *err)
 {
-    return weft_fail(err, WEFT_ERR_RANGE, "more than %d jobs are held", MAX_HOLDS);
+    return weft_fail(err, WEFT_ERR_RANGE, "more than %d jobs are held", WEFT_JOB_HOLDS_MAX);
 }
 
 weft_err weft_queue_add(weft_queue *queue, weft_job *job, bool hold, weft_error *err)
 {
-    if (hold && !find_held(queue, 0))
+    if (hold && !weft_job_holds_have_room(&queue->holds))
         return too_many_held(err);
     WEFT_TRY(weft_job_store_add(queue->db, job, err));
     if (hold)
-        expect_holder(queue, job->id);
+        weft_job_holds_expect(&queue->holds, job->id, weft_clock_s());
     (void)weft_job_store_trim(queue->db, KEEP_JOBS, NULL);
     tell_state(queue, job->id);
     queue->look = true;
@@ -526,9 +458,7 @@ weft_err weft_queue_cancel(weft_queue *queue, int64_t id, weft_error *err)
         return WEFT_OK;
     WEFT_TRY(weft_job_store_finished(queue->db, id, WEFT_JOB_CANCELLED, -1, "cancelled before it began", NULL,
                                      err));
-    held_job *const held = find_held(queue, id);
-    if (held)
-        *held = (held_job){0};
+    weft_job_holds_drop(&queue->holds, id);
     tell_state(queue, id);
     queue->look = true;
     return WEFT_OK;
@@ -545,11 +475,11 @@ weft_err weft_queue_resume(weft_queue *queue, int64_t id, weft_error *err)
         return weft_fail(err, WEFT_ERR_EXISTS,
                          "job %" PRId64 " is %s: only a failed or cancelled one is resumed", id,
                          weft_job_state_name(state));
-    if (hold && !find_held(queue, 0))
+    if (hold && !weft_job_holds_have_room(&queue->holds))
         return too_many_held(err);
     WEFT_TRY(weft_job_store_requeue(queue->db, id, err));
     if (hold)
-        expect_holder(queue, id);
+        weft_job_holds_expect(&queue->holds, id, weft_clock_s());
     tell_state(queue, id);
     queue->look = true;
     return WEFT_OK;
@@ -557,15 +487,10 @@ weft_err weft_queue_resume(weft_queue *queue, int64_t id, weft_error *err)
 
 void weft_queue_hold(weft_queue *queue, int64_t id, bool hold)
 {
-    held_job *const held = id > 0 ? find_held(queue, id) : NULL;
-    if (!held)
-        return;
-    held->holders += hold ? 1 : -1;
-    queue->look |= hold;
-    if (held->holders > 0)
-        return;
-    *held = (held_job){0};
-    weft_queue_cancel(queue, id, NULL);
+    const int holders = weft_job_holds_change(&queue->holds, id, hold);
+    queue->look |= hold && holders > 0;
+    if (holders == 0)
+        weft_queue_cancel(queue, id, NULL);
 }
 
 void weft_queue_stop(weft_queue *queue)
@@ -614,8 +539,9 @@ static weft_err look_at_left_over(void *context, weft_job *job, weft_error *err)
 static weft_err look_at_queued(void *context, weft_job *job, weft_error *err)
 {
     (void)err;
+    weft_queue *const queue = context;
     if (weft_job_request_holds(job->request))
-        expect_holder(context, job->id);
+        weft_job_holds_expect(&queue->holds, job->id, weft_clock_s());
     return WEFT_OK;
 }
 
