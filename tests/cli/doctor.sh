@@ -2,13 +2,12 @@
 # weft doctor on a virtual scanner that is healthy, old, badly wired, badly cabled and in use; and weft flash --rig.
 set -u
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 programs=$WEFT_TEST_BUILD/tests/firmware
-rig=
 # shellcheck disable=SC2317
 clean() {
-    [ -n "$rig" ] && kill "$rig" 2>/dev/null && wait "$rig"
+    stop_rig
     rm -rf "$work"
 }
 trap clean EXIT
@@ -21,13 +20,7 @@ line() {
 expect 1 'no virtual scanner runs there' "$weft" doctor --rig "$work/nothing"
 expect 2 'no such option' "$weft" doctor --lights
 
-"$weft" rig --dir r --sample white --size 308x204 --firmware "$programs/firmware-1.0.elf" \
-    --bootloader "$programs/optiboot-328p.hex" >rig.out 2>rig.err 9>&- &
-rig=$!
-for _ in $(seq 300); do
-    [ -s rig.out ] && break
-    sleep 0.1
-done
+start_rig r --sample white --size 308x204 --firmware "$programs/firmware-1.0.elf" --bootloader "$programs/optiboot-328p.hex"
 
 # Old firmware is the one failure; its remedy mends it.
 expect 1 '1 of 19 checks failed' "$weft" doctor --rig r

@@ -56,7 +56,7 @@ wait_for_state() { # JOB STATE
     done
 }
 
-start_rig
+start_twill
 mkdir "$library"
 tell "truth $dir/truth" >/dev/null
 cp -r "$dir/truth/truth.cal" "$library/scanner.cal"

@@ -2,16 +2,14 @@
 # The virtual scanner calibrated from its own photographs and compared with what it is: lens, pose, lights.
 set -u
 weft=$WEFT_TEST_BIN/weft
-[ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
 [ -f "$WEFT_TEST_BIN/libweft_lens_opencv.so" ] || { echo "skipped: this build has no OpenCV"; exit 77; }
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 dir=$(mktemp -d /tmp/weft-calibrate-XXXXXX)
-rig_pid=
 
 # shellcheck disable=SC2317 # called by the trap
 clean_up() {
-    [ -z "$rig_pid" ] || kill "$rig_pid" 2>/dev/null
+    stop_rig
     rm -rf "$dir"
 }
 trap clean_up EXIT
@@ -22,13 +20,7 @@ die() {
     exit 1
 }
 
-"$weft" rig --dir rig >rig.out 2>rig.err 9>&- &
-rig_pid=$!
-for _ in $(seq 200); do
-    [ -s rig.out ] && break
-    kill -0 "$rig_pid" 2>/dev/null || die "the virtual scanner does not start: $(cat rig.err)"
-    sleep 0.1
-done
+start_rig rig
 
 shoot() { # SAMPLE SET OPTIONS...
     local sample=$1 set=$2

@@ -30,7 +30,7 @@ row() {
     echo "ok    $1"
 }
 
-start_rig
+start_twill
 
 # Frames of 616 x 408 in 65 kB packets have 9 packets each; in packets of 1400 bytes 371.
 ratios=(0.001)

@@ -5,14 +5,12 @@
 # normals are those of the undisturbed scan, so no frame has another light.
 # shellcheck source=tests/support/script.sh
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
-[ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 export HOME=$work
-rig=
 # shellcheck disable=SC2317
 clean_up() {
-    [ -z "$rig" ] || kill "$rig" 2>/dev/null
+    stop_rig
     rm -rf "$work"
 }
 trap clean_up EXIT
@@ -21,13 +19,7 @@ fail() {
     exit 1
 }
 
-"$weft" rig --dir r --sample twill --size 616x408 >rig.out 2>rig.err 9>&- &
-rig=$!
-for _ in $(seq 300); do
-    [ -s rig.out ] && break
-    kill -0 "$rig" 2>/dev/null || { cat rig.err; exit 1; }
-    sleep 0.1
-done
+start_rig r --sample twill --size 616x408
 tell() { "$weft" rig --dir r --tell "$1"; }
 expect_dark() {
     tell state | jq -e '.lights_on == []' >/dev/null || fail "$1: lamps are on"
@@ -114,4 +106,4 @@ done
 echo "${WEFT_SOAK_COUNT:-1} sets complete, normals as undisturbed ($calm degrees); $n_deeds deeds, $n_resumes resumes"
 sort deeds | uniq -c
 expect 0 ok tell quit
-wait "$rig"
+await_rig

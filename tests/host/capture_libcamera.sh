@@ -24,7 +24,7 @@ fault() {
     echo "$2" >"$dir/fault"
 }
 
-start_rig
+start_twill
 expect 0 "libcamera Weft test sensor: ready" with_sensor "$weft" devices
 expect 1 "there is no such camera; check its cable" "$weft" capture --rig "$dir/rig" --camera "$id" "$dir/none.set"
 expect 2 "wire" "$weft" capture --rig "$dir/rig" --camera "$id" --trigger pigeon "$dir/none.set"

@@ -8,7 +8,7 @@ set -u
 capture=("$weft" capture --rig "$dir/rig" -q)
 
 expect 1 "no virtual scanner runs there" "${capture[@]}" "$dir/none.set"
-start_rig
+start_twill
 
 # ---- a set ----
 expect 0 '"frames":11,"taken":11' "${capture[@]}" "$dir/full.set" --exposure 0.04 --json
@@ -89,8 +89,7 @@ fi
 pid=$!
 wait_for_frames "$dir/gone.set" 2
 kill -KILL "$(jq .pid "$dir/rig/rig.json")"
-wait "$rig_pid" 2>/dev/null
-rig_pid=
+await_rig
 start_s=$SECONDS
 wait $pid
 [ $? = 1 ] || fail "vanished scanner: the exit status is not 1"
@@ -98,7 +97,7 @@ wait $pid
 [ "$(wc -l <"$dir/err")" = 1 ] || fail "vanished scanner: says $(cat "$dir/err")"
 check_files "$dir/gone.set" capturing 2
 expect 1 "the virtual scanner has ended" "${capture[@]}" "$dir/gone.set" --resume
-start_rig
+start_twill
 expect 0 '"frames":11' "${capture[@]}" "$dir/gone.set" --resume --json
 check_files "$dir/gone.set" complete 11
 

@@ -65,7 +65,7 @@ survived() {
         "$dir/$1.set/set.json" >/dev/null || fail "$1: no retry says \"$2\": $(jq -c '[.frames[].capture.retries]' "$dir/$1.set/set.json")"
 }
 
-start_rig
+start_twill
 
 if [ -n "${WEFT_ALL_FAULTS:-}" ]; then # five helpers are given up one after the other
     until_caught busy-60-s "fault stuck 60"

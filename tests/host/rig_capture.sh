@@ -1,20 +1,19 @@
 #!/usr/bin/env bash
 # weft rig, weft rig --tell and weft capture as a user types them: two samples, two sets that differ.
 set -u
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 weft=$WEFT_TEST_BIN/weft
 work=$(mktemp -d)
-rig=
 # shellcheck disable=SC2317
 clean() {
-    [ -n "$rig" ] && kill "$rig" 2>/dev/null && wait "$rig"
+    stop_rig
     rm -rf "$work"
 }
 trap clean EXIT
 fail() {
     echo "rig_capture: $*" >&2
-    cat "$work/rig.err" >&2
+    cat "$work/r.err" >&2
     exit 1
 }
 cd "$work" || exit 1
@@ -38,15 +37,8 @@ refused "light 3 has its own --bracket but is not in --lights" --lights 0,1 --br
 refused "there is no field {lamp}" --file-name "{kind}-{lamp}"
 refused "leave out the '/'" --file-name "{kind}/{light}"
 
-"$weft" rig --dir r --sample white --size 308x204 --seed 5 >rig.out 2>rig.err &
-rig=$!
-for _ in $(seq 300); do
-    [ -s rig.out ] && break
-    kill -0 "$rig" 2>/dev/null || fail "the rig ended before it was ready"
-    sleep 0.1
-done
-[ -s rig.out ] || fail "the rig is not ready after 30 s"
-cmp -s <(jq -S . rig.out) <(jq -S . r/rig.json) || fail "rig.json is not what was printed"
+start_rig r --sample white --size 308x204 --seed 5
+cmp -s <(jq -S . r.out) <(jq -S . r/rig.json) || fail "rig.json is not what was printed"
 
 "$weft" capture white.set --rig r --exposure 0.03 -q || fail "capture of the white sheet"
 "$weft" rig --dir r --tell "sample twill" >tell.out || fail "sample twill"
@@ -130,9 +122,6 @@ grep -q 'no sample "tweed"' tell.err || fail "unknown sample: $(cat tell.err)"
 grep -q 'nowhere/control.sock' tell.err || fail "no rig: $(cat tell.err)"
 
 "$weft" rig --dir r --tell quit >tell.out || fail "quit"
-wait "$rig"
-status=$?
-rig=
-[ $status = 0 ] || fail "the rig ended with $status"
+await_rig || fail "the rig ended with $?"
 [ -e r/rig.json ] && fail "rig.json is still there"
 exit 0

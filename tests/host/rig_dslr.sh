@@ -3,25 +3,18 @@
 # shellcheck source=tests/support/script.sh
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 command -v gphoto2 dcraw exiftool >/dev/null || { echo "skipped: needs gphoto2, dcraw and exiftool"; exit 77; }
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 export HOME=$work # gphoto2 remembers ports and cameras there
-rig=
 # shellcheck disable=SC2317
 clean_up() {
-    [ -z "$rig" ] || kill "$rig" 2>/dev/null
+    stop_rig
     rm -rf "$work"
 }
 trap clean_up EXIT
 
-"$weft" rig --dir r --sample twill --size 308x204 >rig.out 2>rig.err 9>&- &
-rig=$!
-for _ in $(seq 300); do
-    [ -s rig.out ] && break
-    kill -0 "$rig" 2>/dev/null || { cat rig.err; exit 1; }
-    sleep 0.1
-done
-port=$(jq -r '.cameras[1]' rig.out | sed 's/.*://')
+start_rig r --sample twill --size 308x204
+port=$(jq -r '.cameras[1]' r.out | sed 's/.*://')
 tell() { "$weft" rig --dir r --tell "dslr $1"; }
 camera() { timeout 60 gphoto2 --port "ptpip:127.0.0.1:$port:$port" "$@"; }
 
@@ -57,4 +50,4 @@ expect 0 "Model: D5100" camera --summary
 expect 0 '"releases":2' tell state
 
 expect 0 ok "$weft" rig --dir r --tell quit
-wait "$rig"
+await_rig

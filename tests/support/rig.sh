@@ -1,17 +1,15 @@
-# Sourced by the end-to-end scripts that use the virtual scanner: its lock, a scratch folder, the scanner itself,
+# Sourced by the end-to-end scripts that capture with the virtual scanner: a scratch folder, the scanner with a twill,
 # and what must hold after every failure.
 # shellcheck shell=bash
 weft=$WEFT_TEST_BIN/weft
-[ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
-exec 9>/tmp/weft-rig.lock
-flock 9
+# shellcheck source=tests/support/rig_start.sh
+. "$WEFT_TEST_SOURCE/tests/support/rig_start.sh"
 dir=$(mktemp -d /tmp/weft-rig-test-XXXXXX)
-rig_pid=
 failures=0
 
 # shellcheck disable=SC2317 # called by the trap
 clean_up() {
-    [ -z "$rig_pid" ] || kill "$rig_pid" 2>/dev/null
+    stop_rig
     ! mountpoint -q "$dir/small" || umount "$dir/small"
     rm -rf "$dir"
 }
@@ -31,16 +29,8 @@ expect() {
     grep -qe "$words" "$dir/out" "$dir/err" || fail "$*: does not say \"$words\": $(cat "$dir/out" "$dir/err")"
 }
 
-start_rig() {
-    "$weft" rig --dir "$dir/rig" --size 616x408 --sample twill >"$dir/rig.out" 2>"$dir/rig.err" 9>&- &
-    rig_pid=$!
-    for _ in $(seq 200); do
-        [ -s "$dir/rig.out" ] && return
-        kill -0 "$rig_pid" 2>/dev/null || break
-        sleep 0.1
-    done
-    echo "the virtual scanner does not start: $(cat "$dir/rig.err")"
-    exit 1
+start_twill() {
+    start_rig "$dir/rig" --size 616x408 --sample twill
 }
 
 tell() {
