@@ -21,7 +21,7 @@ typedef struct weft_vectors_model {
     const char *ids;     /* "S-ORD-05" */
     const char *inputs;  /* column names with blanks between, in the order of `in` */
     const char *outputs; /* likewise, of `out`; the table's columns are out_NAME */
-    double rtol;         /* used when no MANIFEST.csv stands beside the table */
+    double rtol;         /* the least that it is held to; a MANIFEST.csv beside the table may allow more */
     void (*eval)(int n, const double *const *in /* [n_in][n] */, double *const *out /* [n_out][n] */);
 } weft_vectors_model;
 

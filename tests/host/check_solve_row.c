@@ -7,7 +7,6 @@
 
 #include <lapacke.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { WIDTH = 203, HEIGHT = 61, N = 10, LANES = WEFT_SOLVE_LANES }; /* 203: a last block of 11 */
@@ -259,42 +258,6 @@ static void test_agrees_with_svd(void **state)
     agrees_with_lapack(&weft_method_svd);
 }
 
-static void test_shared_vectors(void **state)
-{
-    (void)state;
-    FILE *const file = fopen(weft_test_need_shared("spec/vectors/photometric.csv"), "r");
-    assert_non_null(file);
-    char line[8192];
-    int rows = 0;
-    double worst = 0, worst_albedo = 0;
-    assert_non_null(fgets(line, sizeof line, file));
-    while (fgets(line, sizeof line, file)) {
-        double x[54];
-        char *p = line;
-        for (int i = 0; i < 54; i++, p++)
-            x[i] = strtod(p, &p);
-        weft_solve_samples samples = {.n_lights = N, .n_channels = 3};
-        weft_solve_answers answers;
-        for (int j = 0; j < N; j++) {
-            for (int c = 0; c < 3; c++) {
-                samples.at[j].light[c][5] = (float)x[3 * j + c];
-                samples.at[j].value[c][5] = (float)(x[40 + j] / x[30 + j]);
-            }
-            samples.at[j].weight[5] = 1;
-            samples.at[j].grey[5] = samples.at[j].value[0][5];
-        }
-        weft_method_lsq.solve(&samples, &answers);
-        const double n[3] = {answers.normal[0][5], answers.normal[1][5], answers.normal[2][5]};
-        worst = fmax(worst, dome_angle_deg(n, x + 50));
-        rows++;
-        worst_albedo = fmax(worst_albedo, fabs((double)answers.albedo[0][5] - x[53]) / x[53]);
-    }
-    fclose(file);
-    print_message("%d rows, worst normal %.2g degrees, albedo %.2g relative\n", rows, worst, worst_albedo);
-    assert_int_equal(rows, 40);
-    assert_true(worst < 1e-3);
-}
-
 /* ---- noise ---- */
 
 static void test_noise_gives_the_predicted_error(void **state)
@@ -523,7 +486,6 @@ int main(void)
         cmocka_unit_test(test_height_of_the_cloth),
         cmocka_unit_test(test_half_size_pixels_lie_between_sites),
         cmocka_unit_test(test_agrees_with_svd),
-        cmocka_unit_test(test_shared_vectors),
         cmocka_unit_test(test_noise_gives_the_predicted_error),
         cmocka_unit_test(test_bad_samples_are_left_out),
         cmocka_unit_test(test_too_few_or_badly_placed_lights_give_no_answer),

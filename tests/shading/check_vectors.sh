@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The tables of reference values, where they are staged; and that the runner can fail.
-set -eu
+set -eu -o pipefail
 vectors=${WEFT_SHARED:-$WEFT_TEST_SOURCE/../shared}/spec/vectors
 run=$WEFT_TEST_BIN/weft-vectors
 work=$(mktemp -d)
@@ -40,4 +40,5 @@ if [ ! -d "$vectors" ]; then
     echo "skipped: the staged tables $vectors are not here (set WEFT_SHARED to their folder's parent)"
     exit 77
 fi
-"$run" "$vectors"
+"$run" "$vectors" | tee "$work/all"
+tail -1 "$work/all" | grep -q ', 0 failed, 0 skipped$'

@@ -2,6 +2,7 @@
 #include "calibration/charts/colour_vectors.h"
 #include "core/file.h"
 #include "core/text.h"
+#include "host/solve/solve_vectors.h"
 #include "shading/vectors/vectors_single.h"
 #include "shading/vectors/vectors_tables.h"
 
@@ -15,23 +16,23 @@ typedef struct tally {
     int passed, failed, skipped;
 } tally;
 
-/* The tolerance that MANIFEST.csv beside the table gives; `fallback` where there is none. */
-static double suggested_rtol(const char *path, const char *stem, double fallback)
+/* The tolerance that MANIFEST.csv beside the table gives, but not less than the model's. */
+static double suggested_rtol(const char *path, const char *stem, double least)
 {
     char manifest[4096], file[256];
     const char *const name = weft_path_name(path);
     snprintf(manifest, sizeof manifest, "%.*sMANIFEST.csv", (int)(name - path), path);
     snprintf(file, sizeof file, "%s.csv", stem);
     weft_csv csv;
-    double rtol = fallback;
+    double rtol = least;
     if (!weft_file_exists(manifest) || weft_csv_read(manifest, &csv, NULL) != WEFT_OK)
-        return fallback;
+        return least;
     const int file_column = weft_csv_column(&csv, "file"), column = weft_csv_column(&csv, "suggested_rtol");
     for (int row = 0; row < csv.rows && file_column >= 0 && column >= 0; row++)
         if (strcmp(weft_csv_cell(&csv, row, file_column), file) == 0)
             (void)weft_csv_number(&csv, row, column, manifest, &rtol, NULL);
     weft_csv_fini(&csv);
-    return rtol;
+    return rtol > least ? rtol : least;
 }
 
 static bool print_columns(const weft_vectors_column *columns, int n, double rtol)
@@ -74,14 +75,21 @@ static bool print_single(const weft_csv *csv, const char *stem, const char *path
     return good;
 }
 
+static const weft_vectors_model *find(const char *stem)
+{
+    static const weft_vectors_model *const others[] = {weft_calibration_vectors, weft_solve_vectors};
+    const weft_vectors_model *found = weft_vectors_find(stem);
+    for (int i = 0; i < 2 && !found; i++)
+        found = weft_vectors_find_in(others[i], stem);
+    return found;
+}
+
 static void run_file(const char *path, tally *count)
 {
     char stem[128];
     const char *const name = weft_path_name(path);
     snprintf(stem, sizeof stem, "%.*s", (int)strcspn(name, "."), name);
-    const weft_vectors_model *const shading = weft_vectors_find(stem);
-    const weft_vectors_model *const model =
-        shading ? shading : weft_vectors_find_in(weft_calibration_vectors, stem);
+    const weft_vectors_model *const model = find(stem);
     if (!model) {
         printf("%s: no model in this build\n", stem);
         count->skipped++;
@@ -139,8 +147,8 @@ int main(int argc, char **argv)
             argc < 2 ? stderr : stdout,
             "usage: weft-vectors DIR|FILE...\n\nCompares tables of reference values (NAME.csv with columns "
             "out_*) with the function NAME of this build;\nexits 1 when a value is off by more than 1e-12 "
-            "+ rtol |wanted|, rtol from MANIFEST.csv beside the table,\nor in single precision by more than "
-            "1e-5 at the rounded arguments.\n");
+            "+ rtol |wanted|, rtol from MANIFEST.csv beside the table or the "
+            "model's own,\nor in single precision by more than 1e-5 at the rounded arguments.\n");
         return argc < 2 ? 2 : 0;
     }
     for (int i = 1; i < argc; i++) {
