@@ -180,41 +180,73 @@ double weft_channel_mean(const weft_baked *baked, const char *name)
     return c ? coded(baked, c, -1, 0, none) : 0;
 }
 
-typedef struct raster_job {
+/* What a level is read with. */
+typedef struct level_job {
     const weft_baked *baked;
     const weft_channels *wanted;
     const channel *from[WEFT_CHANNELS_MAX];
-    int level;
+    int n, level, width, height;
     double range_mm[2];
-    weft_raster *to;
-} raster_job;
+    weft_raster *raster; /* one of the two is written */
+    weft_image *planes;
+} level_job;
+
+static weft_err plan_level(const weft_baked *baked, const weft_channels *wanted, int level, level_job *job,
+                           weft_error *err)
+{
+    const int w = baked->width >> level, h = baked->height >> level;
+    *job = (level_job){.baked = baked, .wanted = wanted, .level = level};
+    for (; job->n < WEFT_CHANNELS_MAX && wanted->names[job->n]; job->n++)
+        if (!(job->from[job->n] = find(wanted->names[job->n])))
+            return weft_fail(err, WEFT_ERR_USAGE, "'%s' is no channel", wanted->names[job->n]);
+    job->width = w > 0 ? w : 1;
+    job->height = h > 0 ? h : 1;
+    weft_channels_height_range(baked, job->range_mm);
+    return WEFT_OK;
+}
 
 static void raster_rows(void *context, int band, int begin, int end)
 {
-    const raster_job *const job = context;
-    const int n = job->to->channels;
-    const double top = (double)((1 << job->to->bits) - 1);
+    const level_job *const job = context;
+    const double top = (double)((1 << job->raster->bits) - 1);
     (void)band;
-    for (size_t i = (size_t)begin * (size_t)job->to->width; i < (size_t)end * (size_t)job->to->width; i++)
-        for (int c = 0; c < n; c++) {
+    for (size_t i = (size_t)begin * (size_t)job->width; i < (size_t)end * (size_t)job->width; i++)
+        for (int c = 0; c < job->n; c++) {
             double v = fmin(fmax(coded(job->baked, job->from[c], job->level, i, job->range_mm), 0), 1);
             if (job->wanted->srgb && c < 3)
                 v = weft_srgb_encode(v);
-            job->to->data[i * (size_t)n + (size_t)c] = (uint16_t)(v * top + 0.5);
+            job->raster->data[i * (size_t)job->n + (size_t)c] = (uint16_t)(v * top + 0.5);
         }
 }
 
 weft_err weft_channels_raster(const weft_baked *baked, const weft_channels *wanted, int level,
                               weft_raster *raster, weft_error *err)
 {
-    raster_job job = {.baked = baked, .wanted = wanted, .level = level, .to = raster};
-    int n = 0;
-    for (; n < WEFT_CHANNELS_MAX && wanted->names[n]; n++)
-        if (!(job.from[n] = find(wanted->names[n])))
-            return weft_fail(err, WEFT_ERR_USAGE, "'%s' is no channel", wanted->names[n]);
-    const int w = baked->width >> level, h = baked->height >> level;
-    WEFT_TRY(weft_raster_init(raster, w > 0 ? w : 1, h > 0 ? h : 1, n, wanted->bits, err));
-    weft_channels_height_range(baked, job.range_mm);
+    level_job job;
+    WEFT_TRY(plan_level(baked, wanted, level, &job, err));
+    WEFT_TRY(weft_raster_init(raster, job.width, job.height, job.n, wanted->bits, err));
+    job.raster = raster;
     weft_parallel_rows(raster->height, raster_rows, &job);
+    return WEFT_OK;
+}
+
+static void plane_rows(void *context, int band, int begin, int end)
+{
+    const level_job *const job = context;
+    (void)band;
+    for (int c = 0; c < job->n; c++)
+        for (size_t i = (size_t)begin * (size_t)job->width; i < (size_t)end * (size_t)job->width; i++)
+            weft_image_plane(job->planes, c)[i] =
+                (float)coded(job->baked, job->from[c], job->level, i, job->range_mm);
+}
+
+weft_err weft_channels_planes(const weft_baked *baked, const weft_channels *wanted, int level,
+                              weft_image *planes, weft_error *err)
+{
+    level_job job;
+    WEFT_TRY(plan_level(baked, wanted, level, &job, err));
+    WEFT_TRY(weft_image_init(planes, job.width, job.height, job.n, err));
+    job.planes = planes;
+    weft_parallel_rows(planes->height, plane_rows, &job);
     return WEFT_OK;
 }

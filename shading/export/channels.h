@@ -43,6 +43,21 @@ double weft_channel_mean(const weft_baked *baked, const char *name);
 weft_err weft_channels_raster(const weft_baked *baked, const weft_channels *channels, int level,
                               weft_raster *raster, weft_error *err);
 
+/**
+ * One level of a picture at another size, not smaller than the level's own: cubic between the texels
+ * (Catmull-Rom), over the edge as the material goes on there.  Beyond the last level the last one is shown.
+ * @return as weft_channels_raster()
+ */
+weft_err weft_channels_raster_sized(const weft_baked *baked, const weft_channels *channels, int level,
+                                    int width, int height, weft_raster *raster, weft_error *err);
+
+/**
+ * The numbers of one level before they become codes: linear, one plane a channel.
+ * @return as weft_channels_raster()
+ */
+weft_err weft_channels_planes(const weft_baked *baked, const weft_channels *channels, int level,
+                              weft_image *planes, weft_error *err);
+
 /** Lowest and highest height in mm, which `height` is coded between; 0, 0 without a map. */
 void weft_channels_height_range(const weft_baked *baked, double range_mm[2]);
 

@@ -472,15 +472,16 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 
 static weft_err write_ktx2(const weft_export_job *job, weft_error *err)
 {
-    const bool fits =
-        job->baked->width == 0 || weft_ktx2_is_basisu_size(job->baked->width, job->baked->height);
-    if (!fits)
+    const int own[2] = {job->baked->width, job->baked->height};
+    int size[2];
+    weft_ktx2_size(job->baked, WEFT_KTX2_UASTC, size);
+    if (memcmp(own, size, sizeof own) != 0)
         weft_export_lose(job,
-                         "KTX2: glTF wants sides that are multiples of 4, not %d x %d; the pictures are PNG",
-                         job->baked->width, job->baked->height);
-    else
-        weft_export_lose(job, "pictures: UASTC keeps 8 bits a texel; the EXR maps have the rest");
-    return write_swatch(job, fits, err);
+                         "size in texels: glTF wants KTX2 of sides that are multiples of 4; the pictures of "
+                         "%d x %d are stretched to %d x %d",
+                         own[0], own[1], size[0], size[1]);
+    weft_export_lose(job, "pictures: UASTC keeps 8 bits a texel; the EXR maps have the rest");
+    return write_swatch(job, true, err);
 }
 
 const weft_exporter weft_exporter_gltf = {
@@ -493,6 +494,6 @@ const weft_exporter weft_exporter_gltf = {
 const weft_exporter weft_exporter_gltf_ktx2 = {
     .name = "gltf-ktx2",
     .summary = "the same with KTX2 pictures (UASTC) that carry the filtered mips",
-    .version = 1,
+    .version = 2,
     .write = write_ktx2,
 };

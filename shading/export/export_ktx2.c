@@ -47,6 +47,6 @@ static weft_err write(const weft_export_job *job, weft_error *err)
 const weft_exporter weft_exporter_ktx2 = {
     .name = "ktx2",
     .summary = "KTX 2.0 textures that carry the filtered mips",
-    .version = 1,
+    .version = 2,
     .write = write,
 };

@@ -6,6 +6,7 @@
 #include "shading/export/uastc.h"
 
 #include <string.h>
+#include <zstd.h>
 
 enum {
     VK_UNDEFINED = 0,
@@ -19,11 +20,15 @@ enum {
     UASTC = 166,
     UASTC_RGB = 0,
     UASTC_RGBA = 3,
+    ZSTANDARD = 2,
+    ZSTANDARD_LEVEL = 9, /* 18 saves 3 to 9 % more in ten times the time */
 };
 
-bool weft_ktx2_is_basisu_size(int width, int height)
+void weft_ktx2_size(const weft_baked *baked, weft_ktx2_format format, int size[2])
 {
-    return width > 0 && height > 0 && width % 4 == 0 && height % 4 == 0;
+    const int block = format == WEFT_KTX2_UASTC ? 4 : 1;
+    size[0] = (baked->width + block - 1) / block * block;
+    size[1] = (baked->height + block - 1) / block * block;
 }
 
 static void pad_to(weft_text_buffer *out, size_t alignment)
@@ -49,7 +54,7 @@ static void add_descriptor_head(weft_text_buffer *out, int model, int n_samples,
     weft_text_add_le(out, (uint64_t)(texels - 1), 1);
     weft_text_add_le(out, (uint64_t)(texels - 1), 1);
     weft_text_add_le(out, 0, 2);
-    weft_text_add_le(out, (uint64_t)bytes, 8); /* of the only plane */
+    weft_text_add_le(out, (uint64_t)bytes, 8); /* of the only plane, before supercompression */
 }
 
 static void add_sample(weft_text_buffer *out, int offset, int bits, int channel, uint64_t upper)
@@ -114,49 +119,63 @@ static void encode_rows(void *context, int band, int begin, int end)
         }
 }
 
-static size_t level_size(const weft_baked *b, int level, weft_ktx2_format format)
+/* A level without supercompression: the blocks, or the texels. */
+static uint8_t *encode_level(const weft_raster *raster, weft_ktx2_format format, size_t *n, weft_error *err)
 {
-    const int w = b->width >> level > 0 ? b->width >> level : 1,
-              h = b->height >> level > 0 ? b->height >> level : 1;
-    return format == WEFT_KTX2_UASTC ? 16 * (size_t)((w + 3) / 4) * (size_t)((h + 3) / 4)
-                                     : 4 * (size_t)w * (size_t)h;
+    const size_t w = (size_t)raster->width, h = (size_t)raster->height;
+    *n = format == WEFT_KTX2_UASTC ? 16 * ((w + 3) / 4) * ((h + 3) / 4) : 4 * w * h;
+    uint8_t *const bytes = weft_alloc(*n, 1, err);
+    block_job job = {raster, bytes};
+    if (bytes && format == WEFT_KTX2_UASTC)
+        weft_parallel_rows((raster->height + 3) / 4, encode_rows, &job);
+    for (size_t i = 0; bytes && format == WEFT_KTX2_RGBA8 && i < *n; i++)
+        bytes[i] = (uint8_t)raster->data[i];
+    return bytes;
 }
 
-static weft_err add_level(weft_text_buffer *out, const weft_baked *baked, const weft_channels *channels,
-                          weft_ktx2_format format, int level, weft_error *err)
+static weft_err add_compressed(weft_text_buffer *out, const uint8_t *bytes, size_t n, weft_error *err)
+{
+    const size_t bound = ZSTD_compressBound(n);
+    char *const packed = weft_alloc(bound, 1, err);
+    if (!packed)
+        return WEFT_ERR_NOMEM;
+    const size_t size = ZSTD_compress(packed, bound, bytes, n, ZSTANDARD_LEVEL);
+    weft_err status = WEFT_OK;
+    if (ZSTD_isError(size))
+        status = weft_fail(err, WEFT_ERR_NOMEM, "Zstandard: %s", ZSTD_getErrorName(size));
+    else
+        weft_text_add_bytes(out, packed, size);
+    weft_free(packed);
+    return status == WEFT_OK ? weft_text_buffer_status(out, err) : status;
+}
+
+/* Where a level lies, from the first byte of the levels on, and what it is before Zstandard. */
+typedef struct extent {
+    size_t offset, packed, plain;
+} extent;
+
+static weft_err add_level(weft_text_buffer *levels, const weft_baked *baked, const weft_channels *channels,
+                          weft_ktx2_format format, const int size[2], int level, extent *where,
+                          weft_error *err)
 {
     weft_raster raster;
-    WEFT_TRY(weft_channels_raster(baked, channels, level, &raster, err));
-    const size_t n = level_size(baked, level, format);
-    uint8_t *const bytes = weft_alloc(n, 1, err);
-    block_job job = {&raster, bytes};
-    if (bytes && format == WEFT_KTX2_UASTC)
-        weft_parallel_rows((raster.height + 3) / 4, encode_rows, &job);
-    for (size_t i = 0; bytes && format == WEFT_KTX2_RGBA8 && i < n; i++)
-        bytes[i] = (uint8_t)raster.data[i];
-    if (bytes)
-        weft_text_add_bytes(out, (const char *)bytes, n);
-    weft_free(bytes);
+    const int w = size[0] >> level, h = size[1] >> level;
+    WEFT_TRY(weft_channels_raster_sized(baked, channels, level, w > 0 ? w : 1, h > 0 ? h : 1, &raster, err));
+    uint8_t *const bytes = encode_level(&raster, format, &where->plain, err);
     weft_raster_fini(&raster);
-    return bytes ? WEFT_OK : WEFT_ERR_NOMEM;
+    where->offset = levels->n;
+    const weft_err status = bytes ? add_compressed(levels, bytes, where->plain, err) : WEFT_ERR_NOMEM;
+    where->packed = levels->n - where->offset;
+    weft_free(bytes);
+    return status;
 }
 
 /* -- the file ----------------------------------------------------------------------------------------- */
 
-/* Where the levels lie: the smallest first, each at a multiple of its block. */
-static void plan_levels(const weft_baked *baked, weft_ktx2_format format, int levels, size_t from,
-                        size_t *offsets)
-{
-    const size_t alignment = format == WEFT_KTX2_UASTC ? 16 : 4;
-    for (int level = levels - 1; level >= 0; level--) {
-        offsets[level] = (from + alignment - 1) / alignment * alignment;
-        from = offsets[level] + level_size(baked, level, format);
-    }
-}
-
-/* What stands before the levels: header, their index, descriptor, key/values (KTX 2.0, section 3). */
-static void add_head(weft_text_buffer *out, const weft_baked *baked, const weft_channels *channels,
-                     weft_ktx2_format format, int levels, size_t *offsets)
+/* What stands before the levels: header, their index, descriptor, key/values (KTX 2.0, section 3).
+ * Supercompressed levels need no alignment. */
+static void add_head(weft_text_buffer *out, const weft_channels *channels, weft_ktx2_format format,
+                     const int size[2], int n_levels, const extent *levels)
 {
     static const char identifier[12] = {'\xAB', 'K',    'T',  'X',  ' ',    '2',
                                         '0',    '\xBB', '\r', '\n', '\x1A', '\n'};
@@ -164,19 +183,20 @@ static void add_head(weft_text_buffer *out, const weft_baked *baked, const weft_
     add_descriptor(&descriptor, format, channels);
     add_pair(&pairs, "KTXorientation", "rd");
     add_pair(&pairs, "KTXwriter", "Weft " WEFT_VERSION);
-    const size_t dfd = HEADER_BYTES + (size_t)levels * LEVEL_BYTES, kvd = dfd + descriptor.n;
+    const size_t dfd = HEADER_BYTES + (size_t)n_levels * LEVEL_BYTES, kvd = dfd + descriptor.n,
+                 data = kvd + pairs.n;
     const uint64_t vk = format == WEFT_KTX2_UASTC ? VK_UNDEFINED
                         : channels->srgb          ? VK_R8G8B8A8_SRGB
                                                   : VK_R8G8B8A8_UNORM;
     const uint64_t header[] = {vk,
                                1,
-                               (uint64_t)baked->width,
-                               (uint64_t)baked->height,
+                               (uint64_t)size[0],
+                               (uint64_t)size[1],
                                0,
                                0,
                                1,
-                               (uint64_t)levels,
-                               0,
+                               (uint64_t)n_levels,
+                               ZSTANDARD,
                                dfd,
                                descriptor.n,
                                kvd,
@@ -184,13 +204,12 @@ static void add_head(weft_text_buffer *out, const weft_baked *baked, const weft_
     weft_text_add_bytes(out, identifier, sizeof identifier);
     for (size_t i = 0; i < sizeof header / sizeof header[0]; i++)
         weft_text_add_le(out, header[i], 4);
-    weft_text_add_le(out, 0, 8); /* no supercompression data */
+    weft_text_add_le(out, 0, 8); /* no data for all levels together */
     weft_text_add_le(out, 0, 8);
-    plan_levels(baked, format, levels, kvd + pairs.n, offsets);
-    for (int level = 0; level < levels; level++) {
-        weft_text_add_le(out, offsets[level], 8);
-        weft_text_add_le(out, level_size(baked, level, format), 8);
-        weft_text_add_le(out, level_size(baked, level, format), 8);
+    for (int level = 0; level < n_levels; level++) {
+        weft_text_add_le(out, data + levels[level].offset, 8);
+        weft_text_add_le(out, levels[level].packed, 8);
+        weft_text_add_le(out, levels[level].plain, 8);
     }
     weft_text_add_bytes(out, descriptor.text, descriptor.n);
     weft_text_add_bytes(out, pairs.text, pairs.n);
@@ -203,16 +222,19 @@ static void add_head(weft_text_buffer *out, const weft_baked *baked, const weft_
 weft_err weft_ktx2_encode(const weft_baked *baked, const weft_channels *channels, weft_ktx2_format format,
                           weft_text_buffer *out, weft_error *err)
 {
-    const int levels = weft_baked_levels(baked->width, baked->height);
-    const size_t start = out->n;
-    size_t offsets[WEFT_BAKED_MAX_MIPS];
-    add_head(out, baked, channels, format, levels, offsets);
-    WEFT_TRY(weft_text_buffer_status(out, err));
-    for (int level = levels - 1; level >= 0; level--) {
-        for (size_t gap = start + offsets[level] - out->n; gap > 0; gap--)
-            weft_text_add_bytes(out, "", 1);
-        WEFT_TRY(add_level(out, baked, channels, format, level, err));
-        WEFT_TRY(weft_text_buffer_status(out, err));
+    int size[2];
+    weft_ktx2_size(baked, format, size);
+    const int n_levels = weft_baked_levels(size[0], size[1]);
+    extent levels[WEFT_BAKED_MAX_MIPS];
+    weft_text_buffer data = {0};
+    weft_err status = WEFT_OK;
+    for (int level = n_levels - 1; status == WEFT_OK && level >= 0; level--) /* the smallest comes first */
+        status = add_level(&data, baked, channels, format, size, level, &levels[level], err);
+    if (status == WEFT_OK) {
+        add_head(out, channels, format, size, n_levels, levels);
+        weft_text_add_bytes(out, data.text, data.n);
+        status = weft_text_buffer_status(out, err);
     }
-    return WEFT_OK;
+    weft_text_buffer_fini(&data);
+    return status;
 }

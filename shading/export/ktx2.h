@@ -1,4 +1,5 @@
-/** KTX 2.0 textures in memory, with all their mips: plain RGBA of 8 bits, or UASTC for glTF. */
+/** KTX 2.0 textures in memory, with all their mips: plain RGBA of 8 bits, or UASTC for glTF, each
+ *  level supercompressed with Zstandard. */
 #ifndef WEFT_SHADING_EXPORT_KTX2_H
 #define WEFT_SHADING_EXPORT_KTX2_H
 
@@ -10,8 +11,11 @@ typedef enum weft_ktx2_format {
     WEFT_KTX2_UASTC, /* KHR_texture_basisu: RGB, or RGBA where there is a fourth channel */
 } weft_ktx2_format;
 
-/** Whether KHR_texture_basisu takes pictures of this size: multiples of 4. */
-bool weft_ktx2_is_basisu_size(int width, int height);
+/**
+ * Sides of a material's pictures in the file: its own, or for UASTC the next multiples of 4, which
+ * KHR_texture_basisu asks for; its pictures are then brought to that size (channels.h).
+ */
+void weft_ktx2_size(const weft_baked *baked, weft_ktx2_format format, int size[2]);
 
 /**
  * Encodes the levels of a picture as a file.
