@@ -46,15 +46,6 @@ char *weft_batch_side_path(const weft_batch *batch, const char *name, const char
     return weft_asprintf(err, "%s/batch/%s%s", batch->folder, name, suffix);
 }
 
-weft_err weft_batch_program(char path[4096], weft_error *err)
-{
-    const ssize_t n = readlink("/proc/self/exe", path, 4095);
-    if (n <= 0)
-        return weft_fail_errno(err, WEFT_ERR_IO, "/proc/self/exe cannot be read");
-    path[n] = '\0';
-    return WEFT_OK;
-}
-
 void weft_batch_host(char host[256])
 {
     const char *const node = getenv("SLURMD_NODENAME");

@@ -107,9 +107,6 @@ char **weft_batch_task_words(const weft_batch *batch, int i, weft_error *err);
 /** This machine, or the Slurm node that the process runs on. */
 void weft_batch_host(char host[256]);
 
-/** Path of the running program; room for 4096 bytes. */
-weft_err weft_batch_program(char path[4096], weft_error *err);
-
 /**
  * Works on all waiting items in `jobs` processes (0: as many as cores and memory allow).
  * @return WEFT_ERR_CANCELLED after Ctrl-C, when all processes have ended; failures of sets are in the items

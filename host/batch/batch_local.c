@@ -4,6 +4,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/shipped.h"
 #include "host/daemon/child.h"
 
 #include <signal.h>
@@ -29,7 +30,7 @@ typedef struct slot {
 struct local_run {
     weft_batch *batch;
     weft_loop *loop;
-    char program[4096];
+    char program[PATH_MAX];
     int n_slots, next;
     slot slots[MOST_JOBS];
 };
@@ -203,7 +204,7 @@ weft_err weft_batch_run_here(weft_batch *batch, int jobs, weft_error *err)
     if (!run)
         return WEFT_ERR_NOMEM;
     *run = (local_run){.batch = batch};
-    weft_err status = weft_batch_program(run->program, err);
+    weft_err status = weft_program_path(run->program, err);
     if (status == WEFT_OK)
         status = weft_loop_create(&run->loop, err);
     if (status == WEFT_OK) {

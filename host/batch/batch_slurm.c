@@ -12,6 +12,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/sha256.h"
+#include "core/shipped.h"
 #include "core/text_buffer.h"
 #include "host/batch/batch_command.h"
 
@@ -190,14 +191,14 @@ static weft_err call_sbatch(slurm_run *run, const char *script, char *array, wef
 
 static weft_err submit(slurm_run *run, int *n, weft_error *err)
 {
-    char program[4096];
+    char program[PATH_MAX];
     weft_text_buffer script = {0}, array = {0};
     *n = 0;
     for (int i = 0; i < run->batch->n_items; i++)
         *n += to_submit(run, i);
     if (*n == 0)
         return WEFT_OK;
-    weft_err status = weft_batch_program(program, err);
+    weft_err status = weft_program_path(program, err);
     if (status == WEFT_OK)
         status = write_script(run, program, &script, err);
     if (status == WEFT_OK)

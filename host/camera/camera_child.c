@@ -2,6 +2,7 @@
 
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/shipped.h"
 #include "core/version.h"
 
 #include <errno.h>
@@ -27,24 +28,15 @@
 /* The helper beside this program, or where a package puts it; WEFT_HELPERS names another folder. */
 static bool find_helper(const char *backend, char path[PATH_MAX])
 {
-    static const char *const places[] = {".", "../bin", "../libexec/weft", "../lib/weft"};
+    static const char *const places[] = {".", "../bin", "../libexec/weft", NULL};
     const char *const given = getenv("WEFT_HELPERS");
-    char here[PATH_MAX - 64];
-    if (given) {
-        snprintf(path, PATH_MAX, "%.3900s/weft-camera-%s", given, backend);
-        return access(path, X_OK) == 0;
-    }
-    const ssize_t n = readlink("/proc/self/exe", here, sizeof here - 1);
-    if (n <= 0)
+    char name[64];
+    snprintf(name, sizeof name, "weft-camera-%s", backend);
+    if (given)
+        snprintf(path, PATH_MAX, "%.3900s/%s", given, name);
+    else if (weft_shipped_find(name, places, path, NULL) != WEFT_OK)
         return false;
-    here[n] = '\0';
-    *strrchr(here, '/') = '\0';
-    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
-        snprintf(path, PATH_MAX, "%s/%s/weft-camera-%s", here, places[i], backend);
-        if (access(path, X_OK) == 0)
-            return true;
-    }
-    return false;
+    return access(path, X_OK) == 0;
 }
 
 bool weft_camera_child_exists(const char *backend)

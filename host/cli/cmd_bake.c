@@ -264,23 +264,21 @@ static weft_err run(const weft_invocation *inv, const void *void_args, weft_erro
 {
     const bake_args *const args = void_args;
     weft_assets *assets = NULL;
-    char *shipped = NULL;
+    char shipped[PATH_MAX];
     if (args->format && is_u3m(inv->operands[0]))
         return weft_fail(err, WEFT_ERR_USAGE, "--format is for texts (.radattr)");
     if (args->format)
         return rewrite(inv, inv->operands[0], err);
-    if (!args->library)
-        (void)weft_shipped_path("library", &shipped, NULL); /* only needed where a text includes from it */
-    weft_err status =
-        is_u3m(inv->operands[0])
-            ? load_u3m(inv->operands[0], &assets, err)
-            : weft_assets_load(inv->operands[0], args->library ? args->library : shipped, &assets, err);
+    const char *library = args->library;
+    if (!library && weft_shipped_path("library", shipped, NULL) == WEFT_OK)
+        library = shipped; /* without it a text that includes from it says so */
+    weft_err status = is_u3m(inv->operands[0]) ? load_u3m(inv->operands[0], &assets, err)
+                                               : weft_assets_load(inv->operands[0], library, &assets, err);
     if (assets && (status != WEFT_OK || weft_log_get_level() > WEFT_LOG_QUIET))
         weft_diagnostics_print(weft_assets_diagnostics(assets), stderr);
     if (status == WEFT_OK)
         status = work(inv, args, assets, err);
     weft_assets_destroy(assets);
-    weft_free(shipped);
     return status;
 }
 

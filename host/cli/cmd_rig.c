@@ -6,6 +6,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "core/shipped.h"
 #include "host/cli/command.h"
 #include "host/rig/rig_control.h"
 #include "host/rig/rig_options.h"
@@ -75,12 +76,10 @@ static weft_err tell(const weft_invocation *inv, const rig_args *args, weft_erro
 /* Becomes weft-rig; returns only when that fails. */
 static weft_err become_rig(const weft_rig_options *o, weft_error *err)
 {
-    char self[PATH_MAX], program[PATH_MAX + 16], size[32], seed[16], supersample[16];
-    const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    if (n <= 0)
-        return weft_fail_errno(err, WEFT_ERR_IO, "/proc/self/exe cannot be read");
-    self[n] = '\0';
-    snprintf(program, sizeof program, "%.*s/weft-rig", (int)(strrchr(self, '/') - self), self);
+    static const char *const places[] = {".", "../libexec/weft", NULL};
+    char program[PATH_MAX], size[32], seed[16], supersample[16];
+    if (weft_shipped_find("weft-rig", places, program, err) != WEFT_OK)
+        return weft_prefix(err, WEFT_ERR_MISSING, "the virtual scanner is not installed beside this program");
     snprintf(size, sizeof size, "%dx%d", o->size.width, o->size.height);
     snprintf(seed, sizeof seed, "%d", o->seed);
     snprintf(supersample, sizeof supersample, "%d", o->supersample);
@@ -104,11 +103,7 @@ static weft_err become_rig(const weft_rig_options *o, weft_error *err)
         words[k++] = weft_log_get_level() == WEFT_LOG_QUIET ? "--quiet" : "--verbose";
     words[k] = NULL;
     execv(program, (char *const *)(void *)words);
-    return weft_fail_errno(
-        err, WEFT_ERR_MISSING,
-        "%s: the virtual scanner cannot be started; it is built when libsimavr is installed "
-        "(./dev build)",
-        program);
+    return weft_fail_errno(err, WEFT_ERR_MISSING, "%s: the virtual scanner cannot be started", program);
 }
 
 static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)

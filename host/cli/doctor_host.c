@@ -98,6 +98,7 @@ static bool is_in_group(const char *name)
 void weft_doctor_udev_rules(weft_doctor *doctor, weft_doctor_result *result)
 {
     static const char *const places[] = {"/etc/udev/rules.d/70-weft.rules", "/run/udev/rules.d/70-weft.rules",
+                                         "/usr/local/lib/udev/rules.d/70-weft.rules",
                                          "/usr/lib/udev/rules.d/70-weft.rules",
                                          "/lib/udev/rules.d/70-weft.rules"};
     static const char remedy[] =

@@ -4,6 +4,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/shipped.h"
 #include "host/daemon/daemon_socket.h"
 #include "host/daemon/http_server.h"
 #include "host/daemon/listen.h"
@@ -44,15 +45,10 @@ typedef struct daemon_state {
 /* `weft` lies beside `weftd`. */
 static weft_err find_program(daemon_state *d, weft_error *err)
 {
-    char self[PATH_MAX];
-    const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    if (n <= 0)
-        return weft_fail_errno(err, WEFT_ERR_IO, "/proc/self/exe cannot be read");
-    self[n] = '\0';
-    const int used =
-        snprintf(d->program, sizeof d->program, "%.*s/weft", (int)(strrchr(self, '/') - self), self);
-    if (used >= (int)sizeof d->program || access(d->program, X_OK) != 0)
-        return weft_fail_errno(err, WEFT_ERR_MISSING, "%s: the program that does the work is not there",
+    static const char *const places[] = {".", NULL};
+    WEFT_TRY(weft_shipped_find("weft", places, d->program, err));
+    if (access(d->program, X_OK) != 0)
+        return weft_fail_errno(err, WEFT_ERR_MISSING, "%s: the program that does the work cannot be run",
                                d->program);
     return WEFT_OK;
 }

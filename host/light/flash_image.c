@@ -2,6 +2,7 @@
 
 #include "core/file.h"
 #include "core/formats/ihex_file.h"
+#include "core/shipped.h"
 #include "core/text.h"
 
 #include <stdio.h>
@@ -12,25 +13,14 @@
 /* The chip has 32 KiB; the largest bootloader begins at 28. */
 enum { FLASH_BYTES = 32768, PROGRAM_BYTES = 28672 };
 
-static weft_err find_shipped(char path[PATH_MAX], weft_error *err)
+static weft_err find_image(char path[PATH_MAX], weft_error *err)
 {
-    static const char *const places[] = {"../firmware", "../share/weft"};
-    char self[PATH_MAX], built[PATH_MAX + 64] = "";
-    const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-    if (n <= 0)
-        return weft_fail_errno(err, WEFT_ERR_IO, "/proc/self/exe cannot be read; give --image");
-    self[n] = '\0';
-    const int folder = (int)(strrchr(self, '/') - self);
-    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
-        snprintf(built, sizeof built, "%.*s/%s/weft-firmware.hex", folder, self, places[i]);
-        if (weft_file_exists(built) && realpath(built, path))
-            return WEFT_OK;
-    }
-    return weft_fail(
-        err, WEFT_ERR_MISSING,
-        "%s: the firmware image is not there, and not in ../firmware; build it (cmake --build build "
-        "--target weft_firmware) or give --image FILE.hex",
-        built);
+    static const char *const places[] = {"../firmware", "../share/weft", NULL};
+    if (weft_shipped_find("weft-firmware.hex", places, path, err) == WEFT_OK)
+        return WEFT_OK;
+    return weft_prefix(err, WEFT_ERR_MISSING,
+                       "the firmware image is not there; build it (cmake --build build --target "
+                       "weft_firmware) or give --image FILE.hex");
 }
 
 /* The firmware carries the line that it answers to a person's "?". */
@@ -54,7 +44,7 @@ weft_err weft_flash_image_load(const char *path, weft_flash_image *image, weft_e
     uint32_t begin, end;
     *image = (weft_flash_image){0};
     if (!path)
-        WEFT_TRY(find_shipped(image->path, err));
+        WEFT_TRY(find_image(image->path, err));
     else if (!weft_file_exists(path))
         return weft_fail(err, WEFT_ERR_MISSING, "%s: there is no such firmware image", path);
     else if (snprintf(image->path, sizeof image->path, "%s", path) >= (int)sizeof image->path ||

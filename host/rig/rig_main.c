@@ -11,6 +11,7 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/shipped.h"
 #include "core/text.h"
 #include "core/version.h"
 #include "host/rig/dslr.h"
@@ -283,29 +284,19 @@ static bool alive(void *context)
 
 /* ------------------------------------------------------------------------------------------ start and end */
 
-/* The firmware of this build lies at ../firmware, seen from the program. */
+/* The one that was asked for, or that of this build. */
 static weft_err find_firmware(rig *r, weft_error *err)
 {
-    char self[PATH_MAX];
-    if (r->args->options.firmware) {
-        r->firmware = weft_strdup(r->args->options.firmware, err);
-    } else {
-        const ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
-        if (n <= 0)
-            return weft_fail_errno(err, WEFT_ERR_IO, "/proc/self/exe cannot be read; give --firmware");
-        self[n] = '\0';
-        char *const folder = weft_path_folder(self, err);
-        if (!folder)
-            return WEFT_ERR_NOMEM;
-        r->firmware = weft_path_join(folder, "../firmware/weft-firmware.elf", err);
-        weft_free(folder);
-    }
-    if (!r->firmware)
-        return WEFT_ERR_NOMEM;
-    if (strcmp(r->firmware, "none") != 0 && !weft_file_exists(r->firmware))
-        return weft_fail(err, WEFT_ERR_MISSING,
-                         "%s: no firmware there; build it (./dev build) or give --firmware ELF", r->firmware);
-    return WEFT_OK;
+    static const char *const places[] = {"../firmware", "../../share/weft", NULL};
+    const char *const given = r->args->options.firmware;
+    char built[PATH_MAX];
+    if (!given && weft_shipped_find("weft-firmware.elf", places, built, err) != WEFT_OK)
+        return weft_prefix(err, WEFT_ERR_MISSING,
+                           "no firmware there; build it (./dev build) or give --firmware ELF");
+    if (given && strcmp(given, "none") != 0 && !weft_file_exists(given))
+        return weft_fail(err, WEFT_ERR_MISSING, "%s: no firmware there; give the name of an ELF file", given);
+    r->firmware = weft_strdup(given ? given : built, err);
+    return r->firmware ? WEFT_OK : WEFT_ERR_NOMEM;
 }
 
 static weft_err read_setup(const weft_rig_options *options, weft_rig_setup *setup, weft_error *err)
