@@ -26,14 +26,19 @@ static int choice_index(const char *choices, const char *text)
     }
 }
 
+static bool has_range(const weft_field *field)
+{
+    return field->min != 0 || field->max != 0;
+}
+
 static bool in_range(const weft_field *field, double value)
 {
-    return (field->min == 0 && field->max == 0) || (value >= field->min && value <= field->max);
+    return !has_range(field) || (value >= field->min && value <= field->max);
 }
 
 static weft_err wanted_range(const weft_field *field, const char *text, const char *what, weft_error *err)
 {
-    if (field->min == 0 && field->max == 0)
+    if (!has_range(field))
         return weft_fail(err, WEFT_ERR_USAGE, "--%s %s: wanted %s", field->key, text, what);
     return weft_fail(err, WEFT_ERR_USAGE, "--%s %s: wanted %s from %g to %g%s%s", field->key, text, what,
                      field->min, field->max, field->unit ? " " : "", field->unit ? field->unit : "");
@@ -122,7 +127,9 @@ weft_err weft_field_parse(const weft_field *field, const char *text, void *args,
         return WEFT_OK;
     case WEFT_FIELD_F64S:
         if (!parse_numbers(field, text, at))
-            return wanted_range(field, text, "numbers with commas between, each", err);
+            return wanted_range(
+                field, text,
+                has_range(field) ? "numbers with commas between, each" : "numbers with commas between", err);
         return WEFT_OK;
     }
     return WEFT_OK;
@@ -169,6 +176,8 @@ typedef struct parse {
     void *const *args;
     int n_tables, argc, at;
     char *const *argv;
+    const char **operands; /* where words that are no options go, without `visit` */
+    int n_operands;
     weft_fields_visit_fn *visit; /* NULL: values go into the structs */
     void *context;
 } parse;
@@ -198,10 +207,12 @@ static const weft_field *find_short(const parse *p, char letter, void **args)
 static weft_err unknown(const parse *p, const char *word, weft_error *err)
 {
     const char *nearest = NULL;
+    char key[64];
     int best = 3; /* more than two slips is another word */
+    snprintf(key, sizeof key, "%.*s", (int)strcspn(word + 2, "="), word + 2);
     for (int t = 0; t < p->n_tables; t++)
         for (const weft_field *f = p->tables[t]; f && f->key; f++) {
-            const int distance = weft_text_distance(word + 2, f->key);
+            const int distance = weft_text_distance(key, f->key);
             if (distance < best) {
                 best = distance;
                 nearest = f->key;
@@ -209,7 +220,7 @@ static weft_err unknown(const parse *p, const char *word, weft_error *err)
         }
     if (nearest && word[1] == '-')
         return weft_fail(err, WEFT_ERR_USAGE, "%s: no such option; did you mean --%s?", word, nearest);
-    return weft_fail(err, WEFT_ERR_USAGE, "%s: no such option; --help lists them", word);
+    return weft_fail(err, WEFT_ERR_USAGE, "%s: no such option", word);
 }
 
 static weft_err take_value(const parse *p, const weft_field *field, const char *text, void *args,
@@ -250,7 +261,6 @@ static weft_err parse_option(parse *p, weft_error *err)
 
 static bool given(const weft_field *field, void *args)
 {
-    static const weft_numbers no_numbers;
     const void *const at = member(field, args);
     switch (field->type) {
     case WEFT_FIELD_TEXT:
@@ -258,7 +268,7 @@ static bool given(const weft_field *field, void *args)
     case WEFT_FIELD_SIZE:
         return ((const weft_size *)at)->width != 0;
     case WEFT_FIELD_F64S:
-        return ((const weft_numbers *)at)->n != no_numbers.n;
+        return ((const weft_numbers *)at)->n != 0;
     case WEFT_FIELD_TEXTS:
         return ((const weft_texts *)at)->n != 0;
     default:
@@ -266,21 +276,35 @@ static bool given(const weft_field *field, void *args)
     }
 }
 
-weft_err weft_fields_parse_argv(const weft_field *const *tables, void *const *args, int n_tables, int argc,
-                                char *const *argv, const char **operands, int *n_operands, weft_error *err)
+/* Options to take_value(), other words to the visitor or the operands. */
+static weft_err walk(parse *p, weft_error *err)
 {
-    parse p = {.tables = tables, .args = args, .n_tables = n_tables, .argc = argc, .argv = argv};
     bool options = true;
-    *n_operands = 0;
-    for (; p.at < argc; p.at++) {
-        const char *const word = argv[p.at];
+    for (; p->at < p->argc; p->at++) {
+        const char *const word = p->argv[p->at];
         if (options && strcmp(word, "--") == 0)
             options = false;
         else if (options && word[0] == '-' && word[1] != '\0')
-            WEFT_TRY(parse_option(&p, err));
+            WEFT_TRY(parse_option(p, err));
+        else if (p->visit)
+            WEFT_TRY(p->visit(p->context, NULL, word, err));
         else
-            operands[(*n_operands)++] = word;
+            p->operands[p->n_operands++] = word;
     }
+    return WEFT_OK;
+}
+
+weft_err weft_fields_parse_argv(const weft_field *const *tables, void *const *args, int n_tables, int argc,
+                                char *const *argv, const char **operands, int *n_operands, weft_error *err)
+{
+    parse p = {.tables = tables,
+               .args = args,
+               .n_tables = n_tables,
+               .argc = argc,
+               .argv = argv,
+               .operands = operands};
+    WEFT_TRY(walk(&p, err));
+    *n_operands = p.n_operands;
     for (int t = 0; t < n_tables; t++)
         for (const weft_field *f = tables[t]; f && f->key; f++)
             if (f->required && !given(f, args[t]))
@@ -297,17 +321,7 @@ weft_err weft_fields_visit_argv(const weft_field *const *tables, int n_tables, i
                .argv = argv,
                .visit = visit,
                .context = context};
-    bool options = true;
-    for (; p.at < argc; p.at++) {
-        const char *const word = argv[p.at];
-        if (options && strcmp(word, "--") == 0)
-            options = false;
-        else if (options && word[0] == '-' && word[1] != '\0')
-            WEFT_TRY(parse_option(&p, err));
-        else
-            WEFT_TRY(visit(context, NULL, word, err));
-    }
-    return WEFT_OK;
+    return walk(&p, err);
 }
 
 void weft_fields_print_help(const weft_field *fields, FILE *out)
@@ -322,7 +336,7 @@ void weft_fields_print_help(const weft_field *fields, FILE *out)
         snprintf(left, sizeof left, "%c%c%s--%s%s%s", f->short_opt ? '-' : ' ',
                  f->short_opt ? f->short_opt : ' ', f->short_opt ? ", " : "  ", f->key, value ? " " : "",
                  value ? value : "");
-        if (f->min != 0 || f->max != 0)
+        if (has_range(f))
             snprintf(range, sizeof range, ", %g to %g", f->min, f->max);
         fprintf(out, "  %-34s%s%s", left, strlen(left) > 33 ? "\n                                    " : "",
                 f->help);

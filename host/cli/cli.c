@@ -7,6 +7,8 @@
 #include "core/version.h"
 #include "host/cli/remote.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -118,21 +120,44 @@ static int list_group(const char *word)
     return found;
 }
 
-static int unknown_command(const char *word)
+/* The first words of argv, as many as `name` has, with blanks between. */
+static void join_words(const char *name, int argc, char **argv, char joined[64])
+{
+    int words = 1, used = 0;
+    for (const char *p = name; (p = strchr(p, ' ')) != NULL; p++)
+        words++;
+    joined[0] = '\0';
+    for (int i = 0; i < words && i < argc && used < 64; i++)
+        used += snprintf(joined + used, (size_t)(64 - used), "%s%s", i > 0 ? " " : "", argv[i]);
+}
+
+static int unknown_command(int argc, char **argv)
 {
     const char *nearest = NULL;
-    int best = 3;
+    char joined[64], meant[64] = "";
+    int best = 3; /* more than two slips is another word */
+    bool begins = false;
     for (const weft_command *const *c = weft_commands; *c; c++) {
-        const int distance = weft_text_distance(word, (*c)->name);
+        const size_t n = strlen(argv[0]);
+        begins |= strncmp((*c)->name, argv[0], n) == 0 && (*c)->name[n] == ' ';
+        join_words((*c)->name, argc, argv, joined);
+        const int distance = weft_text_distance(joined, (*c)->name);
         if (distance < best) {
             best = distance;
             nearest = (*c)->name;
+            memcpy(meant, joined, sizeof meant);
         }
     }
-    if (nearest)
-        weft_log_error("%s: no such command; did you mean \"weft %s\"?", word, nearest);
+    if (argv[0][0] == '-')
+        weft_log_error("%s: no such option; those of a command go behind its name (weft COMMAND --help)",
+                       argv[0]);
+    else if (nearest)
+        weft_log_error("%s: no such command; did you mean \"weft %s\"?", meant, nearest);
+    else if (begins)
+        weft_log_error("%s %s: no such command; \"weft %s --help\" lists those that begin so", argv[0],
+                       argv[1], argv[0]);
     else
-        weft_log_error("%s: no such command; \"weft --help\" lists them", word);
+        weft_log_error("%s: no such command; \"weft --help\" lists them", argv[0]);
     return weft_err_exit_status(WEFT_ERR_USAGE);
 }
 
@@ -213,26 +238,60 @@ static int run_command(const weft_command *command, int argc, char **argv)
     return exit_status;
 }
 
-int weft_cli_main(int argc, char **argv)
+/* "weft help", "weft help calibrate", "weft help calibrate lens" */
+static int help_about(int argc, char **argv)
 {
-    weft_report_open();
-    if (argc < 2) {
-        print_overview(stderr);
-        return weft_err_exit_status(WEFT_ERR_USAGE);
-    }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
+    int words;
+    if (argc == 0) {
         print_overview(stdout);
         return 0;
     }
-    if (strcmp(argv[1], "--version") == 0) {
+    const weft_command *const command = find_command(argc, argv, &words);
+    if (command)
+        print_help(command, stdout);
+    return command || list_group(argv[0]) ? 0 : unknown_command(argc, argv);
+}
+
+static int dispatch(int argc, char **argv)
+{
+    int words;
+    if (argc == 0) {
+        print_overview(stderr);
+        return weft_err_exit_status(WEFT_ERR_USAGE);
+    }
+    if (strcmp(argv[0], "--help") == 0 || strcmp(argv[0], "-h") == 0 || strcmp(argv[0], "help") == 0)
+        return help_about(argc - 1, argv + 1);
+    if (strcmp(argv[0], "--version") == 0) {
         printf("weft %s\n", WEFT_VERSION);
         return 0;
     }
-    int words;
-    const weft_command *const command = find_command(argc - 1, argv + 1, &words);
+    const weft_command *const command = find_command(argc, argv, &words);
     if (command)
-        return run_command(command, argc - 1 - words, argv + 1 + words);
-    if ((argc == 2 || argv[2][0] == '-') && list_group(argv[1]))
-        return argc == 2 ? weft_err_exit_status(WEFT_ERR_USAGE) : 0;
-    return unknown_command(argv[1]);
+        return run_command(command, argc - words, argv + words);
+    if ((argc == 1 || argv[1][0] == '-') && list_group(argv[0]))
+        return argc == 1 ? weft_err_exit_status(WEFT_ERR_USAGE) : 0;
+    return unknown_command(argc, argv);
+}
+
+/* A standard stream that is closed (weft ... >&-) would be the number of the next file opened, and the
+ * results would go into it: instead they fail. */
+static void occupy_standard_streams(void)
+{
+    for (int fd = 0; fd <= 2; fd++)
+        if (fcntl(fd, F_GETFD) < 0)
+            (void)open("/dev/null", fd == 0 ? O_WRONLY : O_RDONLY);
+}
+
+int weft_cli_main(int argc, char **argv)
+{
+    occupy_standard_streams();
+    weft_report_open();
+    const int exit_status = dispatch(argc - 1, argv + 1);
+    const int flushed = fflush(stdout), number = errno;
+    if (flushed == 0 && !ferror(stdout))
+        return exit_status;
+    if (exit_status == 0) /* who failed before has said why */
+        weft_log_error("the results cannot be written to stdout: %s",
+                       flushed == 0 ? "part of them is lost" : strerror(number));
+    return exit_status ? exit_status : weft_err_exit_status(WEFT_ERR_IO);
 }

@@ -7,13 +7,32 @@ failures=0
 expect 0 "usage: weft COMMAND" "$weft" --help
 expect 0 "weft 0." "$weft" --version
 expect 2 "usage: weft COMMAND" "$weft"
+expect 0 "usage: weft calibrate lens" "$weft" help calibrate lens
+expect 0 "weft calibrate white" "$weft" help calibrate
+expect 2 "no such command" "$weft" help embroider
 expect 2 "did you mean \"weft completion\"" "$weft" completoin
+expect 2 "calibrate lenz: no such command; did you mean \"weft calibrate lens\"" "$weft" calibrate lenz
+expect 2 "did you mean \"weft light on\"" "$weft" lihgt on 3
+expect 2 "calibrate everything: no such command; \"weft calibrate --help\" lists" "$weft" calibrate everything
+expect 2 "behind its name" "$weft" --json brdf
+expect 2 "no such command" "$weft" ""
 expect 2 "no such command" "$weft" embroider
 expect 2 "SHELL is missing" "$weft" completion
 expect 2 "too many words" "$weft" completion bash fish
 expect 2 "there is: bash" "$weft" completion tcsh
 expect 2 "no such option" "$weft" completion --colour bash
 expect 2 "did you mean --quiet" "$weft" completion --quite bash
+expect 2 "did you mean --method" "$weft" solve --metod=robust
+expect 2 "wanted numbers with commas between (" "$weft" preview a.maps --light abc
+
+# Results that cannot be written are a failure, said in one line; a reader that goes away early is none of it.
+for what in --help --version "brdf" "completion bash" "brdf --json"; do
+    # shellcheck disable=SC2086
+    expect 1 "cannot be written" bash -c '"$@" >/dev/full' bash "$weft" $what
+    # shellcheck disable=SC2086
+    expect 1 "cannot be written" bash -c '"$@" >&-' bash "$weft" $what
+done
+[ "$("$weft" brdf --json 2>err | head -c 1)" = "{" ] && [ ! -s err ] || { echo "FAIL: a closed pipe: $(cat err)"; failures=$((failures + 1)); }
 
 # Every command explains itself, with an example, on stdout.
 while read -r name; do
