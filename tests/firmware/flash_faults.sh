@@ -11,13 +11,13 @@ mute=$!
 
 # The old bootloader; firmware of another protocol is no obstacle; --json.
 board nano "$programs/firmware-of-protocol-2.elf" "$old_boot"
-expect 1 'speaks protocol 2' "$weft" light status --port "$pty"
+expect 1 'speaks protocol 2' patiently "$weft" light status --port "$pty"
 expect 0 '"before":null' patiently "$weft" flash --port "$pty" --baud 57600 --json
 [ "$(jq -r .now.firmware out)" != null ] || die "not one JSON object: $(cat out)"
 
 # Another processor.
 board other none "$programs/optiboot-168.hex"
-expect 1 'no ATmega328P (signature 0x1e9406' "$weft" flash --port "$pty"
+expect 1 'no ATmega328P (signature 0x1e9406' patiently "$weft" flash --port "$pty"
 also 'nothing was written'
 
 # A bit of the flash memory no longer takes a 1 (at an odd address: the second line's first byte with bit 0).
@@ -25,14 +25,13 @@ worn=$(objcopy -I ihex -O binary "$image" image.bin && od -An -v -tu1 -w1 image.
     awk 'NR > 5000 && $1 % 2 { print NR - 1; exit }')
 board worn none "$optiboot"
 tell worn wear "$worn"
-expect 1 'does not hold what was written' "$weft" flash --port "$pty"
+expect 1 'does not hold what was written' patiently "$weft" flash --port "$pty"
 
 # Somebody has the port: without any lock, as a serial monitor, and with Weft's.
 board busy "$WEFT_TEST_BUILD/firmware/weft-firmware.elf" "$optiboot"
 sleep 60 7<>"$pty" &
 sleeper=$!
-for _ in $(seq 100); do
-    [ "$(cat /proc/$sleeper/comm 2>/dev/null)" = sleep ] && break # and has the port open
+until [ "$(cat /proc/$sleeper/comm)" = sleep ]; do # and has the port open
     sleep 0.05
 done
 expect 1 "another program is using this port: sleep (process $sleeper)" "$weft" flash --port "$pty"
@@ -40,8 +39,8 @@ kill $sleeper
 wait $sleeper 2>/dev/null
 "$weft" light on 1 --port "$pty" >on.out 2>&1 &
 holder=$!
-for _ in $(seq 300); do
-    grep -q '^on' on.out && break
+until grep -q '^on' on.out; do
+    kill -0 $holder 2>/dev/null || die "the lights do not go on: $(cat on.out)"
     sleep 0.05
 done
 expect 1 "another program is using this port: weft (process $holder)" "$weft" flash --port "$pty"

@@ -25,8 +25,8 @@ board() {
     boards+=($!)
     exec {fd}>"$1.in"
     eval "in_$1=$fd"
-    for _ in $(seq 100); do
-        [ -s "$1.out" ] && break
+    until [ -s "$1.out" ]; do # however busy the machine is, it has started or ended at last
+        kill -0 "${boards[-1]}" 2>/dev/null || break
         sleep 0.02
     done
     read -r pty <"$1.out"
@@ -39,27 +39,29 @@ tell() {
 }
 
 # patiently COMMAND...: on a machine with far more work than processors a bootloader gives up, as it should, before
-# avrdude has its turn; then again, as weft flash says.  Elsewhere once.
+# avrdude has its turn; then again, as weft flash says.  Elsewhere, and whatever else it says, once.
 patiently() {
-    local status=0 tries=1
-    until "$@"; do
-        status=$?
-        awk -v n="$(nproc)" '{ exit !($1 > 1.5 * n) }' /proc/loadavg || return $status
-        [ $tries -lt 5 ] || return $status
+    local status tries=0
+    while true; do
+        status=0
+        "$@" >try.out 2>try.err || status=$?
         tries=$((tries + 1))
+        { grep -q 'answer' try.err && [ $tries -lt 8 ] &&
+            awk -v n="$(nproc)" '{ exit !($1 > n) }' /proc/loadavg; } || break
     done
+    cat try.out
+    cat try.err >&2
+    return $status
 }
 
 # starts flashing $pty in the background and waits until avrdude writes
 flash_until_writing() {
     "$weft" flash --port "$pty" -v >flash.out 2>flash.err &
     flasher=$!
-    for _ in $(seq 600); do
-        grep -q 'avrdude: writing' flash.err && return
+    until grep -q 'avrdude: writing' flash.err; do
         kill -0 "$flasher" 2>/dev/null || die "ended before it wrote: $(cat flash.err)"
         sleep 0.02
     done
-    die "does not begin to write: $(cat flash.err)"
 }
 # ended STATUS WORDS: how that flashing ended
 ended() {
