@@ -40,6 +40,6 @@ expect 0 "weftd" grep "^ExecStart=/.*/bin/weftd" prefix/lib/systemd/system/weftd
 expect 0 "weft-calibrate-lens" mandoc prefix/share/man/man1/weft.1
 
 # The virtual scanner is found, and finds its firmware before it looks for the sample.
-expect 1 "no-such-cloth" away "$weft" rig --dir rig --sample no-such-cloth
+expect 2 "no-such-cloth" away "$weft" rig --dir rig --sample no-such-cloth
 rm prefix/share/weft/weft-firmware.elf
 expect 1 "weft-firmware.elf: is not there" away "$weft" rig --dir rig --sample no-such-cloth
