@@ -7,7 +7,7 @@
 
 extern const weft_exporter weft_exporter_gltf, weft_exporter_gltf_ktx2;
 extern const weft_exporter weft_exporter_mtlx;
-extern const weft_exporter weft_exporter_png;
+extern const weft_exporter weft_exporter_png, weft_exporter_tiff;
 extern const weft_exporter weft_exporter_u3m;
 extern const weft_exporter weft_exporter_ktx2, weft_exporter_unreal, weft_exporter_unity_hdrp,
     weft_exporter_unity_urp;
@@ -16,6 +16,7 @@ extern const weft_exporter weft_exporter_godot, weft_exporter_blender;
 /* One a line, so that a new one is one line. */
 const weft_exporter *const weft_exporters[] = {
     &weft_exporter_png,        //
+    &weft_exporter_tiff,       //
     &weft_exporter_gltf,       //
     &weft_exporter_gltf_ktx2,  //
     &weft_exporter_u3m,        //

@@ -51,7 +51,7 @@ judge() { # NAME NEEDS-FILE COMMAND...: exit 0, and not a word on stderr
     silent+=("$name")
 }
 all() { find . -name "$1" | sort; } # base and layers of run-time layers too
-mapfile -t glb < <(all '*.glb') && mapfile -t mtlx < <(all '*.mtlx') && mapfile -t png < <(all '*.png')
+mapfile -t glb < <(all '*.glb') && mapfile -t mtlx < <(all '*.mtlx') && mapfile -t png < <(all '*.png') && mapfile -t tif < <(all '*.tif')
 mapfile -t exr < <(all '*.exr') && mapfile -t u3m < <(all '*.u3ma' | xargs -n1 dirname) && mapfile -t ktx2 < <(all '*.ktx2')
 modules=$WEFT_JUDGES/node_modules
 judge gltf-validator "$modules/gltf-validator" node "$judges/judge_gltf.js" "${glb[@]}"
@@ -63,8 +63,8 @@ judge "U3M schema and zip rules" "$shared/data/u3m/u3m1.1/spec/u3m_schema.json" 
 judge pngcheck /usr/bin/pngcheck pngcheck -q "${png[@]}"
 judge exrinfo /usr/bin/exrinfo exrinfo -s "${exr[@]}"
 judge exrheader /usr/bin/exrheader exrheader "${exr[@]}"
-judge tiffinfo /usr/bin/tiffinfo tiffinfo look.tif
-echo "${#glb[@]} .glb, ${#mtlx[@]} .mtlx, ${#ktx2[@]} .ktx2, ${#u3m[@]} .u3ma, ${#png[@]} .png, ${#exr[@]} .exr"
+judge tiffinfo /usr/bin/tiffinfo tiffinfo -D "${tif[@]}"
+echo "${#glb[@]} .glb, ${#mtlx[@]} .mtlx, ${#ktx2[@]} .ktx2, ${#u3m[@]} .u3ma, ${#png[@]} .png, ${#tif[@]} .tif, ${#exr[@]} .exr"
 echo "silent: ${silent[*]}"
 
 # the judges can fail
