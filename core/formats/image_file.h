@@ -1,11 +1,11 @@
-/** Reading and writing a picture by what its name ends in (.exr .png .tif .tiff). */
+/** Reading and writing a picture by what its name ends in (.exr .png .tif .tiff; read only: .jpg .jpeg). */
 #ifndef WEFT_CORE_FORMATS_IMAGE_FILE_H
 #define WEFT_CORE_FORMATS_IMAGE_FILE_H
 
 #include "core/formats/raster.h"
 #include "core/image.h"
 
-/** Reads grey (1 plane) or RGB (3 planes) as linear light; EXR as it is, PNG and TIFF 0..1 by `transfer`. */
+/** Reads grey (1 plane) or RGB (3 planes) as linear light; EXR as it is, the others 0..1 by `transfer`. */
 weft_err weft_image_read(const char *path, weft_transfer transfer, weft_image *image, weft_error *err);
 
 /** Writes 1 or 3 planes: EXR half (linear), PNG/TIFF with `bits` and `transfer`; whole or not at all. */

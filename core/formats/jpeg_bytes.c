@@ -45,6 +45,8 @@ weft_err weft_jpeg_decode(const unsigned char *bytes, size_t n, weft_raster *ras
     weft_err status = WEFT_OK;
     if (tjDecompressHeader3(decoder, bytes, n, &width, &height, &sampling, &space) != 0)
         status = weft_fail(err, WEFT_ERR_FORMAT, "is a damaged JPEG: %s", tjGetErrorStr2(decoder));
+    else if (width < 1 || height < 1) /* the file ends before it says so */
+        status = weft_fail(err, WEFT_ERR_FORMAT, "is a damaged JPEG: it ends in its header");
     else if ((uint64_t)width * (uint64_t)height > (uint64_t)n * MAX_PIXELS_A_BYTE)
         status = weft_fail(err, WEFT_ERR_FORMAT, "is a damaged JPEG: %d x %d px do not fit into it", width,
                            height);

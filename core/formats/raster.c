@@ -26,6 +26,11 @@ void weft_raster_fini(weft_raster *raster)
     *raster = (weft_raster){0};
 }
 
+static bool is_srgb(weft_transfer transfer, int bits)
+{
+    return transfer == WEFT_TRANSFER_SRGB || (transfer == WEFT_TRANSFER_BY_BITS && bits == 8);
+}
+
 /* One entry per code: 65536 roots are cheaper than one per pixel. */
 static float *make_decode_table(int bits, weft_transfer transfer, weft_error *err)
 {
@@ -33,7 +38,7 @@ static float *make_decode_table(int bits, weft_transfer transfer, weft_error *er
     float *const table = weft_alloc((size_t)n, sizeof *table, err);
     for (int i = 0; table && i < n; i++) {
         const double x = (double)i / (n - 1);
-        table[i] = (float)(transfer == WEFT_TRANSFER_SRGB ? weft_srgb_decode(x) : x);
+        table[i] = (float)(is_srgb(transfer, bits) ? weft_srgb_decode(x) : x);
     }
     return table;
 }
@@ -62,14 +67,14 @@ weft_err weft_image_from_raster(weft_image *image, const weft_raster *raster, we
     return status;
 }
 
-static uint16_t encode(float value, double top, weft_transfer transfer)
+static uint16_t encode(float value, double top, bool srgb)
 {
     if (!(value > 0)) /* NaN too */
         return 0;
     if (value >= 1)
         return (uint16_t)top;
     const double x = (double)value;
-    return (uint16_t)(top * (transfer == WEFT_TRANSFER_SRGB ? weft_srgb_encode(x) : x) + 0.5);
+    return (uint16_t)(top * (srgb ? weft_srgb_encode(x) : x) + 0.5);
 }
 
 weft_err weft_raster_from_image(weft_raster *raster, const weft_image *image, int bits,
@@ -81,12 +86,13 @@ weft_err weft_raster_from_image(weft_raster *raster, const weft_image *image, in
     WEFT_TRY(weft_raster_init(&made, image->width, image->height, image->planes, bits, err));
     const size_t width = (size_t)image->width, step = (size_t)image->planes;
     const double top = (1 << bits) - 1;
+    const bool srgb = is_srgb(transfer, bits);
     for (int v = 0; v < image->height; v++, weft_mem_trim())
         for (int p = 0; p < image->planes; p++) {
             const float *const row = weft_image_row(image, p, v);
             uint16_t *const to = made.data + (size_t)v * width * step + (size_t)p;
             for (size_t i = 0; i < width; i++)
-                to[i * step] = encode(row[i], top, transfer);
+                to[i * step] = encode(row[i], top, srgb);
         }
     *raster = made;
     return WEFT_OK;

@@ -27,7 +27,11 @@ weft_err weft_raster_init(weft_raster *raster, int width, int height, int channe
 void weft_raster_fini(weft_raster *raster);
 
 /** How numbers in a file stand for light. */
-typedef enum weft_transfer { WEFT_TRANSFER_LINEAR, WEFT_TRANSFER_SRGB } weft_transfer;
+typedef enum weft_transfer {
+    WEFT_TRANSFER_LINEAR,
+    WEFT_TRANSFER_SRGB,
+    WEFT_TRANSFER_BY_BITS, /* of colours, by docs/conventions.md: sRGB in 8 bits, linear in 16 */
+} weft_transfer;
 
 /** Planes 0..1 (alpha dropped) from a raster; sRGB codes are decoded to linear when asked. */
 weft_err weft_image_from_raster(weft_image *image, const weft_raster *raster, weft_transfer transfer,

@@ -6,6 +6,7 @@
 #include "core/file.h"
 #include "core/mem.h"
 #include "shading/brdf/merl.h"
+#include "shading/brdf/specular_doubt.h"
 #include "shading/vectors/vectors_tables.h"
 
 #include <math.h>
@@ -227,6 +228,7 @@ static weft_err examine(const weft_invocation *inv, const brdf_args *a, const we
     weft_brdf_defaults(brdf, values);
     for (int i = 0; i < a->params.n; i++)
         WEFT_TRY(weft_brdf_set(brdf, a->params.values[i], values, err));
+    weft_specular_warn(brdf, values, NULL);
     if (a->plot)
         WEFT_TRY(weft_file_refuse_existing(a->plot, inv->force, err));
     if (a->merl && !weft_path_has_suffix(a->merl, ".binary"))

@@ -101,6 +101,7 @@ static weft_err look_at_input(const weft_invocation *inv, const weft_preview_opt
     weft_preview_crop shown = view->crop;
     const char *const folder = inv->n_operands ? inv->operands[0] : NULL;
     WEFT_TRY(weft_preview_input_load(&input, folder, a->brdf, &a->params, err));
+    weft_preview_input_warn(&input);
     weft_err status = WEFT_OK;
     if (a->match) {
         status = weft_preview_match(inv, &input, a->match, a->cal, a->output, err);
@@ -193,7 +194,7 @@ const weft_command weft_cmd_preview = {
         "origin\n"
         "on a plane, from the middle of the other shapes.",
     .example =
-        "weft preview twill.maps -o twill.png --brdf cloth --param f0=0.1 --shape sphere --light 60,30\n"
+        "weft preview twill.maps -o twill.png --brdf cloth --param f0=0.05 --shape sphere --light 60,30\n"
         "  weft preview twill.maps -o twill.webp --shape drape --turntable 48 --resume\n"
         "  weft preview twill.maps -o twill-shadows.png --self-shadow --light 20,20",
     .run = run,

@@ -6,6 +6,7 @@
 #include "core/mem.h"
 #include "shading/bake/material_file.h"
 #include "shading/brdf/half_vector.h"
+#include "shading/brdf/specular_doubt.h"
 
 #include <string.h>
 
@@ -221,6 +222,14 @@ weft_err weft_preview_input_height(weft_preview_input *input, const char *folder
                                               "--height poisson, or give --height-map)");
     weft_free(path);
     return status;
+}
+
+void weft_preview_input_warn(const weft_preview_input *input)
+{
+    bool known[WEFT_BRDF_MAX_PLANES];
+    for (int k = 0; k < WEFT_BRDF_MAX_PLANES; k++)
+        known[k] = !input->surface.maps[k].image;
+    weft_specular_warn(input->surface.brdf, input->surface.params, known);
 }
 
 void weft_preview_input_fini(weft_preview_input *input)

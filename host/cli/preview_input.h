@@ -46,6 +46,9 @@ weft_err weft_preview_input_level(weft_preview_input *input, double texels_per_p
 weft_err weft_preview_input_height(weft_preview_input *input, const char *folder, const char *file,
                                    weft_error *err);
 
+/** Warns of constants that no surface has (brdf/specular_doubt.h). */
+void weft_preview_input_warn(const weft_preview_input *input);
+
 void weft_preview_input_fini(weft_preview_input *input);
 
 /** Last part of a path, without trailing slashes and without ".maps" or ".set"; on the heap. */

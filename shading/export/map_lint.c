@@ -1,5 +1,7 @@
 #include "shading/export/map_lint.h"
 
+#include "shading/brdf/specular_doubt.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -121,6 +123,55 @@ void weft_lint_albedo(const weft_lint *lint, const weft_image *albedo)
                  : "%.1f %% above 90 %%",
         high);
     say(lint, WEFT_LINT_GOOD, "mean albedo", "%.3f", sum);
+}
+
+static void colour_at(const weft_image *image, size_t i, double rgb[3])
+{
+    for (int c = 0; c < 3; c++)
+        rgb[c] = (double)weft_image_plane(image, image->planes == 3 ? c : 0)[i];
+}
+
+/* Share, in percent, of the texels for which one of the bits of `doubts` holds.  Without albedo it is black.
+ */
+static double doubtful(const weft_image *albedo, const weft_image *f0, unsigned doubts)
+{
+    const size_t count = weft_image_plane_size(f0);
+    size_t n = 0;
+    for (size_t i = 0; i < count; i++) {
+        double diffuse[3] = {0}, specular[3];
+        if (albedo)
+            colour_at(albedo, i, diffuse);
+        colour_at(f0, i, specular);
+        n += (weft_specular_doubts(diffuse, specular) & doubts) != 0;
+    }
+    return 100.0 * (double)n / (double)count;
+}
+
+void weft_lint_specular(const weft_lint *lint, const weft_image *f0)
+{
+    const double coloured = doubtful(NULL, f0, WEFT_DOUBT_COLOURED);
+    const double outside = doubtful(NULL, f0, WEFT_DOUBT_LOW | WEFT_DOUBT_HIGH);
+    say(lint, coloured > 1 ? WEFT_LINT_NOTE : WEFT_LINT_GOOD, "grey specular",
+        coloured > 1 ? "%.1f %% of the texels have a coloured F0 that is no metal's (0.2): make them grey"
+                     : "%.1f %% are coloured and no metal",
+        coloured);
+    say(lint, outside > 1 ? WEFT_LINT_NOTE : WEFT_LINT_GOOD, "range of F0",
+        outside > 1
+            ? "%.1f %% of the texels are neither a dielectric (0.017 to 0.067) nor a metal (above 0.2): "
+              "is the map gloss, or linear taken for sRGB?"
+            : "%.1f %% are neither dielectric nor metal",
+        outside);
+}
+
+void weft_lint_specular_pair(const weft_lint *lint, const weft_image *albedo, const weft_image *f0)
+{
+    const double both = doubtful(albedo, f0, WEFT_DOUBT_DIFFUSE);
+    say(lint, both > 1 ? WEFT_LINT_NOTE : WEFT_LINT_GOOD, "specular, albedo",
+        both > 1
+            ? "%.1f %% of the texels have an albedo above 0.2 beside the F0 of a metal (above 0.2), which "
+              "has no diffuse light: darken one of them there"
+            : "%.1f %% are above 0.2 in both",
+        both);
 }
 
 static double step(const weft_image *image, int xa, int ya, int xb, int yb)

@@ -27,6 +27,15 @@ void weft_lint_normal(const weft_lint *lint, const weft_image *normal);
  */
 void weft_lint_albedo(const weft_lint *lint, const weft_image *albedo);
 
+/**
+ * F0 (1 or 3 planes, linear): dielectrics are grey and between 0.017 and 0.067; above 0.2 is a metal, and
+ * nothing lies between (brdf/specular_doubt.h).
+ */
+void weft_lint_specular(const weft_lint *lint, const weft_image *f0);
+
+/** Albedo beside F0 of the same size: where F0 is a metal's there is no diffuse light above 0.2. */
+void weft_lint_specular_pair(const weft_lint *lint, const weft_image *albedo, const weft_image *f0);
+
 /** Any picture: finite; its size; whether it repeats (the step over its edges against those inside). */
 void weft_lint_picture(const weft_lint *lint, const weft_image *image);
 

@@ -7,37 +7,7 @@ printf ':w := ( opaquematerial :scan = "weave.maps" )\n' >w.radattr
 "$weft" bake w.radattr -o w.material --size 256x256 --export png >/dev/null
 expect 0 '0 wrong' "$weft" lint w.material/png
 python3 - <<'TEXT'
-import math, struct, zlib
-
-def read(path):  # 8- or 16-bit RGB, as Weft writes it
-    data, at, body = open(path, "rb").read(), 8, b""
-    while at < len(data):
-        n, kind = struct.unpack(">I4s", data[at:at + 8])
-        if kind == b"IHDR":
-            w, h, bits, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
-        if kind == b"IDAT":
-            body += data[at + 8:at + 8 + n]
-        at += 12 + n
-    assert colour == 2
-    step, raw, out, last = 3 * bits // 8, zlib.decompress(body), [], bytearray(w * 3 * bits // 8)
-    for y in range(h):
-        line = bytearray(raw[y * (len(last) + 1) + 1:(y + 1) * (len(last) + 1)])
-        rule = raw[y * (len(last) + 1)]
-        for i in range(len(line)):
-            a, b, c = (line[i - step] if i >= step else 0), last[i], (last[i - step] if i >= step else 0)
-            p = a + b - c
-            near = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            line[i] = (line[i] + (0, a, b, (a + b) // 2, near)[rule]) & 255
-        out.append(line)
-        last = line
-    return w, h, bits, out
-
-def write(path, w, h, bits, lines):
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    head = struct.pack(">IIBBBBB", w, h, bits, 2, 0, 0, 0)
-    body = zlib.compress(b"".join(b"\0" + bytes(line) for line in lines))
-    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b""))
+import math, pngfile
 
 def waves(sign):  # rows go down where y goes up
     lines = []
@@ -52,12 +22,23 @@ def waves(sign):  # rows go down where y goes up
         lines.append(line)
     return lines
 
-write("up_normal.png", 128, 128, 8, waves(1))
-write("down_normal.png", 128, 128, 8, waves(-1))
-w, h, bits, lines = 128, 128, 8, waves(1)
-write("short_normal.png", w, h, bits, [bytes(128 + (v - 128) // 2 for v in line) for line in lines])
-w, h, bits, lines = read("w.material/png/albedo.png")
-write("dark_albedo.png", w, h, bits, [bytes(v // 8 for v in line) for line in lines])
+pngfile.write("up_normal.png", 128, 128, 8, 3, waves(1))
+pngfile.write("down_normal.png", 128, 128, 8, 3, waves(-1))
+pngfile.write("short_normal.png", 128, 128, 8, 3, [bytes(128 + (v - 128) // 2 for v in line) for line in waves(1)])
+w, h, bits, n, lines = pngfile.read("w.material/png/albedo.png")
+pngfile.write("dark_albedo.png", w, h, bits, n, [[v // 8 for v in line] for line in lines])
+
+# 16 bits are linear, 8 bits sRGB: the same F0 of 0.045 in both; 0.1 is nothing's, 0.5 a metal's
+def even(path, bits, rgb):
+    pngfile.write(path, 64, 64, bits, 3, [list(rgb) * 64] * 64)
+even("good_specular.png", 16, [2949] * 3)
+even("coded_specular.png", 8, [60] * 3)
+even("blue_specular.png", 16, [2621, 2621, 3932])
+even("high_specular.png", 16, [6554] * 3)
+even("metal_specular.png", 16, [32768] * 3)
+even("coded_albedo.png", 8, [188] * 3)
+even("Other_albedo.png", 8, [188] * 3)
+even("Metal_albedo.png", 8, [188] * 3)
 TEXT
 expect 0 'grows upwards' "$weft" lint up_normal.png
 expect 0 'grows downwards' "$weft" lint down_normal.png
@@ -66,5 +47,13 @@ expect 1 'less than the black patch' "$weft" lint dark_albedo.png
 expect 1 'WRONG' "$weft" lint w.material/png/albedo.png w.material/png/normal.png weave.maps
 grep -q 'but the first map of the set is 256 x 256' out
 "$weft" lint --json w.material/png | python3 -c 'import json, sys; assert json.load(sys.stdin)["wrong"] == 0'
+expect 0 '0.0 % are neither dielectric nor metal' "$weft" lint good_specular.png
+expect 0 '0.0 % are neither dielectric nor metal' "$weft" lint coded_specular.png
+expect 0 '100.0 % of the texels have a coloured F0' "$weft" lint blue_specular.png
+expect 0 '100.0 % of the texels are neither' "$weft" lint high_specular.png
+expect 0 '100.0 % of the texels have an albedo above 0.2' "$weft" lint Metal_albedo.png metal_specular.png
+expect 0 '0.0 % are above 0.2 in both' "$weft" lint coded_albedo.png coded_specular.png
+"$weft" lint Other_albedo.png metal_specular.png >out # of different sets
+! grep -q 'specular, albedo' out
 mkdir empty
 expect 1 'empty: holds no pictures' "$weft" lint empty

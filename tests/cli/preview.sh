@@ -6,12 +6,8 @@ set -eu
 "$WEFT_TEST_BUILD/tests/make-weave-maps" sensor.maps sensor
 
 is_png() { # FILE WIDTH HEIGHT
-    python3 - "$@" <<'EOF'
-import struct, sys
-data = open(sys.argv[1], "rb").read()
-assert data[:8] == b"\x89PNG\r\n\x1a\n" and data[-8:-4] == b"IEND", "not a whole PNG"
-assert struct.unpack(">II", data[16:24]) == (int(sys.argv[2]), int(sys.argv[3])), struct.unpack(">II", data[16:24])
-EOF
+    python3 -c 'import pngfile, sys
+assert pngfile.read(sys.argv[1])[:2] == (int(sys.argv[2]), int(sys.argv[3]))' "$@"
 }
 
 expect 0 'plane.png: 400 x 300, lambert' "$weft" preview weave.maps -o plane.png
@@ -19,6 +15,9 @@ is_png plane.png 400 300
 expect 0 '"width":64' "$weft" preview weave.maps/ -o ball.png --json --shape sphere --brdf cloth --param f0=0.2,0.1,0.1 \
     --size 64x48 --fov 20 --light 60,20
 is_png ball.png 64 48
+grep -qF 'warning: f0 0.2,0.1,0.1: only metals' out && grep -qF 'warning: f0 0.2: dielectrics end at 0.067' out
+expect 0 'beside the f0 of a metal' "$weft" preview weave.maps -o metal.png --brdf ggx --param f0=0.9 --param albedo=0.5 --size 8x8
+"$weft" preview weave.maps -o bare.png --brdf ggx --param f0=0.9 --param albedo=0.1 --size 8x8 2>out >/dev/null && [ ! -s out ]
 expect 0 'point.exr' "$weft" preview weave.maps -o point.exr --light-mm=-20,0,40 --brdf ggx --param alpha=weave.maps/confidence.exr
 expect 2 '1 to 16' "$weft" preview weave.maps -o never.png --taps 17
 expect 2 'samples|trilinear' "$weft" preview weave.maps -o never.png --filter bilinear
@@ -41,17 +40,11 @@ expect 0 'sheet.png: 672 x ' "$weft" contact weave.maps sensor.maps -o sheet.png
 
 # a captured set of three small mosaics: the red light is twice as bright as the other, which must stay visible
 python3 - <<'EOF'
-import json, os, struct, zlib
-def png(path, rows):
-    data = b"".join(b"\0" + b"".join(struct.pack(">H", v) for v in row) for row in rows)
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 16, 0, 0, 0, 0)
-    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+import json, os, pngfile
 os.mkdir("small.set")
 frames = []
 for name, level, role in (("ambient", 300, "ambient"), ("a", 4256, "light"), ("b", 2256, "light")):
-    png(f"small.set/{name}.png", [[level if (x < 16) else 256 for x in range(32)] for y in range(24)])
+    pngfile.write(f"small.set/{name}.png", 32, 24, 16, 1, [[level if (x < 16) else 256 for x in range(32)]] * 24)
     frames.append({"file": name + ".png", "role": role, "exposure_s": 0.1, "gain": 1.0})
     if role == "light":
         frames[-1]["light"] = len(frames) - 2
@@ -62,29 +55,11 @@ EOF
 expect 0 'frames.png: 172 x' "$weft" contact small.set -o frames.png --tile 20x20
 # the first tile is light 0: left half at white (255), right half black; the second, half as bright, 188
 python3 - <<'EOF'
-import struct, zlib
-data, at, body = open("frames.png", "rb").read(), 8, b""
-while at < len(data):
-    n, kind = struct.unpack(">I4s", data[at:at + 8])
-    if kind == b"IHDR":
-        width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
-    if kind == b"IDAT":
-        body += data[at + 8:at + 8 + n]
-    at += 12 + n
-assert (depth, colour) == (8, 2)
-raw, rows, stride = zlib.decompress(body), [], 3 * width
-above = bytearray(stride)
-for y in range(height):
-    kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
-    for i in range(stride):
-        left, up, corner = line[i - 3] if i > 2 else 0, above[i], above[i - 3] if i > 2 else 0
-        p = left + up - corner
-        paeth = min((left, up, corner), key=lambda v: (abs(p - v), 0))
-        line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[kind]) & 255
-    rows.append(line)
-    above = line
+import pngfile
+_, _, bits, channels, rows = pngfile.read("frames.png")
+assert (bits, channels) == (8, 3)
 def pixel(x, y):
-    return tuple(rows[y][3 * x:3 * x + 3])
+    return rows[y][3 * x:3 * x + 3]
 top = 12 + 28 + 10 # gap, title, middle of a tile
 assert pixel(12 + 5, top) == (255, 255, 255), pixel(12 + 5, top)
 assert pixel(12 + 15, top) == (0, 0, 0), pixel(12 + 15, top)
@@ -95,7 +70,7 @@ EOF
 export XDG_CACHE_HOME="$PWD/cache"
 expect 0 'sky.png: 48 x 48' "$weft" preview -o sky.png --brdf ggx --shape sphere --sky 225,40 --lamp 225,40 --tone agx --size 48x48
 test -f cache/weft/*.table
-expect 0 'pano.png' "$weft" preview weave.maps -o pano.png --env sky.png --lamp none --brdf cloth --shape drape --size 40x40
+expect 0 'pano.png' "$weft" preview weave.maps -o pano.png --env sky.png --lamp none --brdf cloth --shape drape --size 40x40 --draft
 expect 0 'roll.png' "$weft" preview weave.maps -o roll.png --shape cylinder --lamp ball:-40,40,60,9,2 --area representative --size 40x40
 expect 0 'grid.png: 348 x' "$weft" preview -o grid.png --brdf ggx,cloth --columns alpha=0.1,0.3,0.9 --shape sphere --size 100x60
 expect 0 'lamps.png: 196 x' "$weft" preview -o lamps.png --columns lamps --lamp 0,30 --lamp tube:-9,0,9,9,0,9 --shape sphere --size 80x80
@@ -167,11 +142,11 @@ expect 0 '4 frames' "$weft" preview weave.maps -o soft.png --sweep 4 --size 30x2
 cp soft-003.png kept.png && rm soft-003.png # resumed, it remembers what the kept frames were
 expect 0 '3 of them kept' "$weft" preview weave.maps -o soft.png --sweep 4 --size 30x24 --self-shadow --shadow-steps 4 --temporal --resume
 cmp soft-003.png kept.png
-expect 0 'fog.png' "$weft" preview weave.maps -o fog.png --shape drape --size 40x40 --lamp ball:-40,40,60,9 --fog 0.5
+expect 0 'fog.png' "$weft" preview weave.maps -o fog.png --shape drape --size 40x40 --lamp ball:-40,40,60,9 --fog 0.5 --draft
 expect 0 'even.png' "$weft" preview weave.maps -o even.png --size 40x40 --fog 0.5 --fog-even --fog-g 0
 expect 2 'fog-g' "$weft" preview weave.maps -o x.png --fog 0.5 --fog-g 2
-expect 0 'folds.png' "$weft" preview weave.maps -o folds.png --shape drape --size 60x60 --folds marched --voxels 64 --lamp ball:-40,40,60,9
-expect 0 'walked.png' "$weft" preview weave.maps -o walked.png --shape drape --size 60x60 --folds walked --self-shadow --height-map weave.maps/height.exr
+expect 0 'folds.png' "$weft" preview weave.maps -o folds.png --shape drape --size 60x60 --folds marched --voxels 64 --lamp ball:-40,40,60,9 --draft
+expect 0 'walked.png' "$weft" preview weave.maps -o walked.png --shape drape --size 60x60 --folds walked --self-shadow --height-map weave.maps/height.exr --draft
 rm weave.maps/height.exr
 expect 1 'solve with --height poisson' "$weft" preview weave.maps -o x.png --self-shadow
 expect 1 '3 planes; heights are one' "$weft" preview weave.maps -o x.png --self-shadow --height-map weave.maps/albedo.exr

@@ -4,36 +4,17 @@ holds the result against the flattened pictures beside it.  Prints the largest d
 codes of the pictures leave open."""
 import json
 import math
-import struct
 import sys
-import zlib
 from pathlib import Path
+
+import pngfile
 
 
 def read_png(path):
-    """[pixels][channels] in 0..1, not interlaced, and the size."""
-    data, at, body = path.read_bytes(), 8, b""
-    while at < len(data):
-        n, kind = struct.unpack(">I4s", data[at:at + 8])
-        chunk = data[at + 8:at + 8 + n]
-        if kind == b"IHDR":
-            width, height, bits, colour, _, _, _ = struct.unpack(">IIBBBBB", chunk)
-        elif kind == b"IDAT":
-            body += chunk
-        at += 12 + n
-    channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
-    step, stride = channels * bits // 8, width * channels * bits // 8
-    raw, above, pixels = zlib.decompress(body), bytearray(stride), []
-    for y in range(height):
-        kind, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
-        for i in range(stride):
-            a, b, c = row[i - step] if i >= step else 0, above[i], above[i - step] if i >= step else 0
-            near = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
-            row[i] = (row[i] + (0, a, b, (a + b) // 2, near)[kind]) & 255
-        values = struct.unpack(f">{width * channels}{'H' if bits == 16 else 'B'}", row)
-        pixels += [[v / (2 ** bits - 1) for v in values[x * channels:(x + 1) * channels]] for x in range(width)]
-        above = row
-    return pixels, width, height
+    """[pixels][channels] in 0..1, and the size."""
+    width, height, bits, n, rows = pngfile.read(path)
+    top = 2 ** bits - 1
+    return [[v / top for v in row[x * n:(x + 1) * n]] for row in rows for x in range(width)], width, height
 
 
 def decode(v):

@@ -6,6 +6,7 @@
 #include "core/formats/exr_file.h"
 #include "core/formats/half.h"
 #include "core/formats/image_file.h"
+#include "core/formats/jpeg_bytes.h"
 #include "core/formats/png_file.h"
 #include "core/formats/tiff_file.h"
 #include "core/mem.h"
@@ -404,6 +405,47 @@ static void test_masks(void **state)
     weft_mask_fini(&mask);
 }
 
+static void test_jpeg_is_read_only(void **state)
+{
+    (void)state;
+    uint8_t rgb[16 * 16 * 3];
+    for (int i = 0; i < 16 * 16 * 3; i++)
+        rgb[i] = (uint8_t)(40 + i / 3 % 16 * 8); /* a ramp that no coder finds hard */
+    unsigned char *bytes;
+    size_t n;
+    weft_image image;
+    assert_ok(weft_jpeg_encode(rgb, 16, 16, 100, &bytes, &n, err));
+    assert_ok(weft_file_write(weft_test_path("r.JPG"), bytes, n, err));
+    assert_ok(weft_file_write(weft_test_path("cut.jpeg"), bytes, 20, err));
+    weft_jpeg_free(bytes);
+    assert_ok(weft_image_read(weft_test_path("r.JPG"), WEFT_TRANSFER_LINEAR, &image, err));
+    assert_int_equal(image.planes, 3);
+    for (int i = 0; i < 256; i++)
+        assert_near((double)image.data[i], (40 + i % 16 * 8) / 255.0, 3 / 255.0);
+    weft_image_fini(&image);
+    assert_fails(weft_image_read(weft_test_path("cut.jpeg"), WEFT_TRANSFER_LINEAR, &image, err),
+                 WEFT_ERR_FORMAT, "cut.jpeg: is a damaged JPEG");
+}
+
+static void test_transfer_by_bits(void **state)
+{
+    (void)state;
+    static const struct {
+        int bits;
+        weft_transfer same;
+    } rows[] = {{8, WEFT_TRANSFER_SRGB}, {16, WEFT_TRANSFER_LINEAR}};
+    for (int k = 0; k < 2; k++) {
+        weft_image image, back;
+        assert_ok(weft_image_init(&image, 1, 1, 1, err));
+        image.data[0] = 0.25F;
+        assert_ok(weft_image_write(weft_test_path("t.png"), &image, rows[k].bits, rows[k].same, err));
+        assert_ok(weft_image_read(weft_test_path("t.png"), WEFT_TRANSFER_BY_BITS, &back, err));
+        assert_near((double)back.data[0], 0.25, 0.005);
+        weft_image_fini(&back);
+        weft_image_fini(&image);
+    }
+}
+
 static void test_pictures_by_name(void **state)
 {
     (void)state;
@@ -432,7 +474,7 @@ static void test_pictures_by_name(void **state)
                 }
     weft_image image = make_image(4, 4, 2);
     assert_fails(weft_image_write(weft_test_path("i.jpg"), &image, 8, WEFT_TRANSFER_SRGB, err),
-                 WEFT_ERR_FORMAT, "i.jpg: a picture's name must end in .exr");
+                 WEFT_ERR_FORMAT, "i.jpg: a picture's name must end in .exr, .png, .tif or .tiff");
     assert_fails(weft_image_write(weft_test_path("x.png"), &image, 8, WEFT_TRANSFER_SRGB, err),
                  WEFT_ERR_RANGE, "1 or 3 planes, not 2");
     weft_image_fini(&image);
@@ -468,6 +510,8 @@ int main(void)
         cmocka_unit_test(test_png_palette_is_expanded),
         cmocka_unit_test(test_masks),
         cmocka_unit_test(test_pictures_by_name),
+        cmocka_unit_test(test_jpeg_is_read_only),
+        cmocka_unit_test(test_transfer_by_bits),
         cmocka_unit_test(test_rounding_and_clamping),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

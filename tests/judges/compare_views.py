@@ -3,41 +3,15 @@
 ratio, the correlation of the brightness, and the direction that the weave's slopes prefer in each; with limits
 "MIN-CORRELATION MAX-RATIO MAX-DEGREES" behind, exits 1 beyond them."""
 import math
-import struct
 import sys
-import zlib
+
+import pngfile
 
 
 def read_png(path):
     """8 bit RGB or RGBA, as linear light."""
-    data, at, body = open(path, "rb").read(), 8, b""
-    while at < len(data):
-        n, kind = struct.unpack(">I4s", data[at:at + 8])
-        chunk = data[at + 8:at + 8 + n]
-        if kind == b"IHDR":
-            width, height, bits, colour, _, _, interlace = struct.unpack(">IIBBBBB", chunk)
-            assert bits == 8 and colour in (2, 6) and not interlace, path
-        elif kind == b"IDAT":
-            body += chunk
-        at += 12 + n
-    step = 3 if colour == 2 else 4
-    raw, rows, above = zlib.decompress(body), [], bytearray(width * step)
-    for y in range(height):
-        kind, row = raw[y * (width * step + 1)], bytearray(raw[y * (width * step + 1) + 1:(y + 1) * (width * step + 1)])
-        for i in range(len(row)):
-            a, b, c = row[i - step] if i >= step else 0, above[i], above[i - step] if i >= step else 0
-            if kind == 1:
-                row[i] = (row[i] + a) & 255
-            elif kind == 2:
-                row[i] = (row[i] + b) & 255
-            elif kind == 3:
-                row[i] = (row[i] + (a + b) // 2) & 255
-            elif kind == 4:
-                p = a + b - c
-                near = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-                row[i] = (row[i] + near) & 255
-        rows.append(row)
-        above = row
+    width, _, bits, step, rows = pngfile.read(path)
+    assert bits == 8 and step > 2, path
     linear = [v / 255 / 12.92 if v <= 10 else ((v / 255 + 0.055) / 1.055) ** 2.4 for v in range(256)]
     return [[[linear[row[x * step + c]] for c in range(3)] for x in range(width)] for row in rows]
 

@@ -10,6 +10,7 @@
 #include "shading/brdf/log_positive.h"
 #include "shading/brdf/quadrature.h"
 #include "shading/brdf/sampling.h"
+#include "shading/brdf/specular_doubt.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -572,6 +573,32 @@ static void test_parameters_are_set_by_name(void **state)
     assert_memory_equal(values, wanted, sizeof wanted);
 }
 
+static void test_doubts_of_the_specular_workflow(void **state)
+{
+    (void)state;
+    static const struct {
+        double diffuse[3], f0[3];
+        unsigned doubts;
+    } rows[] = {
+        {{0.5, 0.5, 0.5}, {0.04, 0.04, 0.04}, 0},
+        {{0.5, 0.5, 0.5}, {0.017, 0.017, 0.017}, 0}, /* both ends belong to dielectrics */
+        {{0.5, 0.5, 0.5}, {0.067, 0.067, 0.067}, 0},
+        {{0.5, 0.5, 0.5}, {0, 0, 0}, 0},
+        {{0.5, 0.5, 0.5}, {0.016, 0.016, 0.016}, WEFT_DOUBT_LOW},
+        {{0.5, 0.5, 0.5}, {0.068, 0.068, 0.068}, WEFT_DOUBT_HIGH},
+        {{0.5, 0.5, 0.5}, {0.04, 0.041, 0.043}, 0}, /* as grey as a picture of 8 bits can say */
+        {{0.5, 0.5, 0.5}, {0.04, 0.04, 0.05}, WEFT_DOUBT_COLOURED},
+        {{0.5, 0.5, 0.5}, {0.1, 0.01, 0.01}, WEFT_DOUBT_COLOURED | WEFT_DOUBT_LOW | WEFT_DOUBT_HIGH},
+        {{0.1, 0.1, 0.1}, {1, 0.78, 0.34}, 0}, /* gold, tarnished */
+        {{0.3, 0.3, 0.3}, {1, 0.78, 0.34}, WEFT_DOUBT_DIFFUSE},
+        {{0.9, 0, 0}, {1, 0.78, 0.34}, 0}, /* a red of luminance 0.19 */
+        {{(double)NAN, 0, 0}, {0.04, 0.04, 0.04}, 0},
+        {{0.5, 0.5, 0.5}, {(double)NAN, (double)NAN, (double)NAN}, 0},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        assert_int_equal(weft_specular_doubts(rows[i].diffuse, rows[i].f0), rows[i].doubts);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -588,6 +615,7 @@ int main(void)
         cmocka_unit_test(test_logarithm_and_exponential),
         cmocka_unit_test(test_albedos_known_from_elsewhere),
         cmocka_unit_test(test_parameters_are_set_by_name),
+        cmocka_unit_test(test_doubts_of_the_specular_workflow),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,6 +2,7 @@
 # shellcheck shell=bash
 # shellcheck disable=SC2034 # used by the scripts
 weft=$WEFT_TEST_BIN/weft
+export PYTHONPATH=$WEFT_TEST_SOURCE/tests/support PYTHONDONTWRITEBYTECODE=1 # pngfile.py
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
