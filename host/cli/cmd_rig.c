@@ -8,6 +8,7 @@
 #include "core/mem.h"
 #include "core/shipped.h"
 #include "host/cli/command.h"
+#include "host/cli/rig_start.h"
 #include "host/rig/rig_control.h"
 #include "host/rig/rig_options.h"
 
@@ -57,6 +58,7 @@ static weft_err tell(const weft_invocation *inv, const rig_args *args, weft_erro
     char line[2 * PATH_MAX];
     json_t *reply = NULL;
     WEFT_TRY(make_line(args->tell, line, err));
+    WEFT_TRY(weft_rig_start_wait(args->rig.dir, err));
     char *const socket = weft_path_join(args->rig.dir, "control.sock", err);
     if (!socket)
         return WEFT_ERR_NOMEM;

@@ -3,6 +3,7 @@
 #include "core/file.h"
 #include "core/json.h"
 #include "core/mem.h"
+#include "host/cli/rig_start.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -89,6 +90,7 @@ static weft_err name_dev(const char *folder, weft_device_names *names, weft_erro
 static weft_err load_rig(const char *folder, const char *backend, weft_device_names *names, weft_error *err)
 {
     json_t *rig = NULL;
+    WEFT_TRY(weft_rig_start_wait(folder, err));
     char *const path = weft_path_join(folder, "rig.json", err);
     if (!path)
         return WEFT_ERR_NOMEM;

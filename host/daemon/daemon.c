@@ -209,7 +209,9 @@ static weft_err set_up(daemon_state *d, weft_error *err)
     WEFT_TRY(take_signals(d, err));
     WEFT_TRY(weft_events_create(epoch, &d->events, err));
     if (d->options->rig && !realpath(d->options->rig, d->rig))
-        return weft_fail_errno(err, WEFT_ERR_MISSING, "--rig %s", d->options->rig);
+        return weft_fail_errno(err, WEFT_ERR_MISSING,
+                               "--rig %s: start the virtual scanner first (weft rig --dir %s)",
+                               d->options->rig, d->options->rig);
     const weft_queue_options queue = {.program = d->program, .cpu_jobs = d->options->cpu_jobs};
     WEFT_TRY(weft_queue_create(&queue, d->loop, d->db, d->events, &d->live, &d->queue, err));
     WEFT_TRY(weft_queue_recover(d->queue, err));

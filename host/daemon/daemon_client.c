@@ -16,7 +16,9 @@
 
 /* A daemon that writes to a slow disk is given so long. */
 #define CALL_TIMEOUT_S 30.0
-#define REPLY_LIMIT    ((size_t)64 << 20)
+/* For a daemon that was named and is just starting, or starting again. */
+#define START_S     1.0
+#define REPLY_LIMIT ((size_t)64 << 20)
 
 static int dial(const char *path)
 {
@@ -46,7 +48,12 @@ weft_err weft_daemon_find(char path[108], bool *found, weft_error *err)
         snprintf(path, 108, "%s", named);
     else
         weft_daemon_default_socket(path);
-    const int fd = dial(path);
+    const double begin_s = weft_clock_s();
+    int fd = dial(path);
+    while (fd < 0 && named && weft_clock_s() - begin_s < START_S) {
+        usleep(50000);
+        fd = dial(path);
+    }
     if (fd < 0 && named)
         return weft_fail_errno(
             err, WEFT_ERR_DEVICE,

@@ -10,7 +10,8 @@
 #include <stdbool.h>
 
 /** Whether a daemon answers, and on which socket: $WEFT_SOCKET ("none" or empty: no daemon is asked for),
- * else the usual place.  @return WEFT_ERR_DEVICE when WEFT_SOCKET names one that does not answer */
+ * else the usual place.  One that is named and does not answer is given a second: it may be starting.
+ * @return WEFT_ERR_DEVICE when WEFT_SOCKET names one that does not answer */
 weft_err weft_daemon_find(char socket[108], bool *found, weft_error *err);
 
 /** One request and its reply; json_decref() it.

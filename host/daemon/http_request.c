@@ -210,7 +210,9 @@ static bool check_body(weft_http_request *r, enum MHD_Result *result)
 
 static enum MHD_Result refuse_method(weft_http_request *r, const char *allowed)
 {
-    char *const text = weft_reply_text(405, "method_not_allowed", "the path does not have that method");
+    char message[100];
+    snprintf(message, sizeof message, "the path has only %s", allowed);
+    char *const text = weft_reply_text(405, "method_not_allowed", message);
     struct MHD_Response *const response =
         text ? MHD_create_response_from_buffer(strlen(text), text, MHD_RESPMEM_MUST_FREE) : NULL;
     if (response)

@@ -8,6 +8,7 @@
 #include <arpa/inet.h>
 
 #include <arv.h>
+#include <errno.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -123,27 +124,30 @@ static void set_registers(const weft_rig_camera *camera, ArvFakeCamera *fake)
 
 /* Aravis shares the port (SO_REUSEADDR), and two cameras would then answer in turn: ask for it alone first.
  */
-static bool port_is_free(const char *address)
+static bool port_is_taken(const char *address)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons(GVCP_PORT)};
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    const bool is_free = fd >= 0 && inet_pton(AF_INET, address, &at.sin_addr) == 1 &&
-                         bind(fd, (const struct sockaddr *)&at, sizeof at) == 0;
+    const bool taken = fd >= 0 && inet_pton(AF_INET, address, &at.sin_addr) == 1 &&
+                       bind(fd, (const struct sockaddr *)&at, sizeof at) != 0 && errno == EADDRINUSE;
     if (fd >= 0)
         close(fd);
-    return is_free;
+    return taken;
 }
 
 static weft_err start(weft_rig_camera *camera, const char *address, weft_error *err)
 {
-    if (port_is_free(address))
-        camera->gv = arv_gv_fake_camera_new_full(address, "rig-0", camera->description);
-    if (!camera->gv || !arv_gv_fake_camera_is_running(camera->gv))
-        return weft_fail(
-            err, WEFT_ERR_DEVICE,
-            "the camera cannot listen at UDP port 3956 of %s: end the other virtual scanner or camera "
-            "simulator there, or give --address another address of this machine",
-            address);
+    if (port_is_taken(address))
+        return weft_fail(err, WEFT_ERR_DEVICE,
+                         "the camera cannot listen at UDP port 3956 of %s: end the other virtual scanner or "
+                         "camera simulator there, or give --address that of another network interface",
+                         address);
+    camera->gv = arv_gv_fake_camera_new_full(address, "rig-0", camera->description);
+    if (!camera->gv || !arv_gv_fake_camera_is_running(camera->gv)) /* 127.0.0.5 could be bound all the same */
+        return weft_fail(err, WEFT_ERR_DEVICE,
+                         "the camera cannot listen at %s: no network interface has that address; give "
+                         "--address one that \"ip address\" lists",
+                         address);
     ArvFakeCamera *const fake = arv_gv_fake_camera_get_fake_camera(camera->gv);
     arv_fake_camera_set_fill_pattern(fake, fill, camera);
     arv_fake_camera_set_trigger_frequency(fake, 1000);

@@ -352,6 +352,7 @@ static weft_err start(rig *r, weft_error *err)
     WEFT_TRY(find_firmware(r, err));
     WEFT_TRY(make_paths(r, err));
     WEFT_TRY(weft_rig_control_create(r->socket_path, &r->control, err));
+    (void)remove(r->json_path); /* of one that was killed: whoever waits for it waits for ours */
     weft_explain("rendering %s at %d x %d", options->sample, setup.size.width, setup.size.height);
     WEFT_TRY(weft_rig_stage_create(&setup, options->sample, &r->stage, err));
     const weft_controller_sim_program program = {

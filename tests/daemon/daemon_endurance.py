@@ -115,7 +115,7 @@ def test_captures_in_a_row():
         took = time.monotonic() - begin
         killer.end.set()
         killer.join()
-        rig.wait_dark(1.5)
+        rig.wait_dark()
         deadline = time.monotonic() + 5
         while figures(d)["processes"] and time.monotonic() < deadline:
             time.sleep(0.1)

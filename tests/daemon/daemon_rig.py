@@ -4,11 +4,13 @@ WEFT_KILLS is how many times the daemon is killed (default 2)."""
 import json
 import os
 import random
+import select
 import signal
+import socket
 import subprocess
 import time
 
-from weftd import BIN, SLOW, Rig, Watcher, Weftd, alive, check_set, children, run_tests, scratch
+from weftd import BIN, SLOW, Rig, Watcher, Weftd, alive, check_set, children, run_tests, scratch, wait_until_gone
 
 KILLS = int(os.environ.get("WEFT_KILLS", "2"))
 
@@ -37,7 +39,7 @@ def test_capture_cancel_resume(d, rig):
     job = d.add("capture", "cancel.set", exposure=0.15)
     wait_for_frames(f"{d.library}/cancel.set", 3)
     assert d.post(f"/v1/jobs/{job}/cancel").status == 202
-    rig.wait_dark(1)
+    rig.wait_dark()
     ended = d.wait(job)
     assert ended["state"] == "cancelled" and "frames are kept" in ended["error"], ended
     kept = len(check_set(f"{d.library}/cancel.set", "capturing", 3)["frames"])
@@ -98,7 +100,7 @@ def test_ctrl_c_cancels_the_job(d, rig):
     client = begin(d, "capture", f"{d.library}/int.set", "--exposure", "0.15")
     wait_for_frames(f"{d.library}/int.set", 2)
     client.send_signal(signal.SIGINT)
-    rig.wait_dark(1)
+    rig.wait_dark()
     _, words = client.communicate(timeout=30)
     assert client.returncode == 130 and "--resume goes on" in words, (client.returncode, words)
     resumed = weft(d, "capture", f"{d.library}/int.set", "--resume", "--json")
@@ -120,24 +122,24 @@ def test_light_lasts_as_long_as_its_holder(d, rig):
         wait_lit(rig)
         assert rig.tell("state")["lights_on"] == [3]
         client.send_signal(number)
-        rig.wait_dark(1.5)
+        rig.wait_dark()
         client.communicate(timeout=30)
         if number == signal.SIGKILL:
             assert client.returncode == status
     job = d.post("/v1/jobs", {"command": "light on", "operands": ["3"], "hold": True}).json
     assert job["state"] == "queued"
-    assert d.wait(job["id"], timeout=15)["state"] == "cancelled", "nobody holds it"
+    assert d.wait(job["id"])["state"] == "cancelled", "nobody holds it"
 
 
 def test_live_view(d, rig):
     assert d.get("/v1/live").status in (200, 404)
     assert d.run("live", lights="all", exposure=0.04, seconds=0.5)["result"]["clipped"][1] > 0.9  # ten lamps at once
-    job = d.add("live", lights="all", rate=5, seconds=1.5, exposure=0.006)
-    d.wait(job, "running")
     sock = Watcher(d)  # any watcher: pictures are announced as events too
-    seen = [data for _, kind, data in sock.until(lambda _, kind, data: kind == "job.state" and data["id"] == job
-                                                 and data["state"] == "done") if kind == "live"]
-    assert len(seen) >= 3, len(seen)
+    job = d.add("live", lights="all", rate=5, exposure=0.006)
+    seen = [next(data for _, kind, data in sock if kind == "live") for _ in range(3)]
+    assert d.post(f"/v1/jobs/{job}/cancel").status == 202
+    assert d.wait(job)["state"] == "done", "the end of a live view is no failure"
+    assert [picture["job"] for picture in seen] == [job] * 3, seen
     info = d.get("/v1/live").json
     assert info["frame"] == [616, 408] and info["width"] == 308 and info["job"] == job, info
     total = 616 * 408
@@ -151,40 +153,46 @@ def test_live_view(d, rig):
     assert d.job(job)["result"]["frames"] >= 3
 
 
+def pictures_of(stream):
+    """The numbers of the whole pictures in what a watcher has received."""
+    assert b"multipart/x-mixed-replace; boundary=weft-frame" in stream
+    numbers = []
+    for part in stream.split(b"--weft-frame\r\n")[1:]:
+        head, _, body = part.partition(b"\r\n\r\n")
+        fields = dict(line.split(b": ") for line in head.split(b"\r\n") if b": " in line)
+        size = int(fields.get(b"Content-Length", 1 << 30))
+        if len(body) >= size:
+            assert body[:3] == b"\xff\xd8\xff" and body[size - 2:size] == b"\xff\xd9"
+            numbers.append(int(fields[b"Weft-Picture"]))
+    return numbers
+
+
 def test_live_stream(d, rig):
     """Two watchers get whole pictures, each newer than the last, at most as often as asked for."""
-    import socket
-    job = d.add("live", rate=5, seconds=2.5)
-    watchers = []
-    for rate in (5, 1):
+    begin_s = time.monotonic()
+    rates, watchers, received = (5, 1), [], [b"", b""]
+    for rate in rates:
         s = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         s.connect(d.socket)
-        s.settimeout(20)
         s.sendall(f"GET /v1/live.mjpg?rate={rate} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
         watchers.append(s)
-    d.wait(job)
-    counts = []
+    job = d.add("live", rate=5)
+    while received[1].count(b"--weft-frame") < 4:  # three pictures of the slow one are whole
+        ready, _, _ = select.select(watchers, [], [], 60 * SLOW)
+        assert ready, "no pictures come"
+        for s in ready:
+            chunk = s.recv(1 << 20)
+            assert chunk, "a watcher is hung up on"
+            received[watchers.index(s)] += chunk
+    took_s = time.monotonic() - begin_s
+    assert d.post(f"/v1/jobs/{job}/cancel").status == 202
+    numbers = [pictures_of(stream) for stream in received]
     for s in watchers:
-        data = b""
-        s.setblocking(False)
-        try:
-            while chunk := s.recv(1 << 20):
-                data += chunk
-        except BlockingIOError:
-            pass
         s.close()
-        assert b"multipart/x-mixed-replace; boundary=weft-frame" in data
-        numbers = []
-        for part in data.split(b"--weft-frame\r\n")[1:]:
-            head, _, body = part.partition(b"\r\n\r\n")
-            fields = dict(line.split(b": ") for line in head.split(b"\r\n"))
-            size = int(fields[b"Content-Length"])
-            if len(body) >= size:
-                assert body[:3] == b"\xff\xd8\xff" and body[size - 2:size] == b"\xff\xd9"
-                numbers.append(int(fields[b"Weft-Picture"]))
-        assert numbers == sorted(set(numbers)), numbers
-        counts.append(len(numbers))
-    assert counts[0] > counts[1] >= 2, counts
+    assert all(n == sorted(set(n)) for n in numbers), numbers
+    assert all(len(n) <= rate * took_s + 1 for n, rate in zip(numbers, rates)), (numbers, took_s)
+    assert len(numbers[0]) >= len(numbers[1]) >= 3, numbers
+    d.wait(job)
 
 
 def second_attempt(d, job, folder):
@@ -203,8 +211,8 @@ def test_host_sigterm(d, rig):
     wait_for_frames(f"{d.library}/term.set", 3)
     before = children(d.process.pid)
     d.process.send_signal(signal.SIGTERM)
-    rig.wait_dark(1)
-    assert d.process.wait(20) == 0 and not any(alive(p) for p in before)
+    rig.wait_dark()
+    assert d.process.wait(30 * SLOW) == 0 and not any(alive(p) for p in before)
     check_set(f"{d.library}/term.set", "capturing", 3)
     d.start()
     ended = d.wait(job)
@@ -230,7 +238,7 @@ def test_host_disk_full(d, rig):
                 pass
         ended = d.wait(job)
         assert ended["state"] == "failed" and ("No space" in ended["error"] or "disk full" in ended["error"]), ended
-        rig.wait_dark(1)
+        rig.wait_dark()
         os.remove(f"{folder}/filler")
         second_attempt(d, job, f"{folder}/full.set")
     finally:
@@ -248,7 +256,7 @@ def test_host_read_only_folder(d, rig):
         job = d.add("capture", "closed/x.set", exposure=0.02)
         ended = d.wait(job)
         assert ended["state"] == "failed" and "closed/x.set" in ended["error"], ended
-        rig.wait_dark(1)
+        rig.wait_dark()
         subprocess.run(["mount", "-o", "remount,bind,rw", folder], check=True)
         second_attempt(d, job, f"{folder}/x.set")
     finally:
@@ -280,7 +288,7 @@ def test_host_clock_step(d, rig):
         jump(365 * 86400)
         ended = d.wait(job)
         assert ended["state"] == "done" and ended["attempt"] == 1, ended
-        assert time.monotonic() - begin_s < 15 * SLOW
+        assert time.monotonic() - begin_s < 50 * SLOW
         years = {frame["capture"]["taken"][:4] for frame in check_set(f"{d.library}/clock.set")["frames"]}
         assert len(years) == 2, f"the clock did not step: {years}"
         assert d.run("light status")["state"] == "done"
@@ -302,11 +310,8 @@ def test_host_sigkill(d, rig):
         time.sleep(chance.uniform(0, 2.5))
         before = children(d.process.pid)
         d.kill()
-        killed = time.monotonic()
-        waits.append(rig.wait_dark(1.0))
-        while any(alive(p) for p in before):
-            assert time.monotonic() - killed < 2, f"seed {seed}, kill {i}: a process outlives its daemon"
-            time.sleep(0.01)
+        waits.append(rig.wait_dark())
+        wait_until_gone(before)
         if frames_of(folder):
             check_set(folder, json.load(open(f"{folder}/set.json", encoding="utf-8"))["state"], 1)
         d.start()

@@ -212,12 +212,58 @@ def children(pid):
     return found
 
 
+def signal_all(pids, number):
+    for pid in pids:
+        try:
+            os.kill(pid, number)
+        except ProcessLookupError:
+            pass
+
+
+def stop_at_work(daemon, add):
+    """Adds jobs by add(0), add(1), ... until the process of one is stopped (SIGSTOP) in the middle of its work: it has
+    told progress and not all of it.  It runs in small steps, so that no load of the machine lets it slip through.
+    The number of the job, and the processes, which go on with SIGCONT."""
+    for i in range(8):
+        job = add(i)
+        while (now := daemon.job(job))["state"] in ("queued", "running"):
+            pids = children(daemon.process.pid) if now["state"] == "running" else []
+            signal_all(pids, signal.SIGCONT)
+            time.sleep(0.002)
+            signal_all(pids, signal.SIGSTOP)
+            progress = daemon.job(job)["progress"]
+            if pids and progress and progress["done"] < progress["total"] and all(alive(p) for p in pids):
+                return job, pids
+    raise AssertionError("every job ends before it can be stopped")
+
+
+def wait_for_signal(pids, number):
+    """Until the signal waits for each of the stopped processes."""
+    deadline = time.monotonic() + 30 * SLOW
+    for pid in pids:
+        while True:
+            with open(f"/proc/{pid}/status", encoding="utf-8") as status:
+                pending = [int(line.split()[1], 16) for line in status if line.startswith(("SigPnd", "ShdPnd"))]
+            if any(mask >> (number - 1) & 1 for mask in pending):
+                break
+            assert time.monotonic() < deadline, f"process {pid} never gets signal {number}"
+            time.sleep(0.002)
+
+
 def alive(pid):
     try:
         with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:
             return stat.read().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def wait_until_gone(pids):
+    """No process outlives its daemon: the kernel ends them together."""
+    deadline = time.monotonic() + 10 * SLOW
+    while any(alive(p) for p in pids):
+        assert time.monotonic() < deadline, "a process outlives its daemon"
+        time.sleep(0.01)
 
 
 def run_one(name, test):
@@ -242,7 +288,8 @@ def run_tests(namespace, at_a_time=1):
 
 
 class Rig:
-    """The virtual scanner; one at a time on a machine (it needs UDP port 3956)."""
+    """The virtual scanner; one at a time on a machine (it needs UDP port 3956 of 127.0.0.1).  For a run of hours beside
+    other tests: WEFT_RIG_LOCK=FILE, inside `unshare -n` after `ip link set lo up`."""
 
     def __init__(self, folder, sample="twill", size="616x408", **more):
         self.folder, self.words = os.path.join(folder, "rig"), ["--sample", sample, "--size", size]
@@ -273,8 +320,8 @@ class Rig:
                               text=True, check=True)
         return json.loads(told.stdout)
 
-    def wait_dark(self, within_s):
-        """Seconds of waiting until all lamps are dark."""
+    def wait_dark(self, within_s=10):
+        """Seconds of waiting until all lamps are dark: the lease is 0.8 s, and a busy machine may take its time to ask."""
         begin = time.monotonic()
         while self.tell("state")["lights_on"]:
             assert time.monotonic() - begin < within_s, f"lamps are on after {within_s} s: {self.tell('state')}"

@@ -4,8 +4,12 @@
 #include "core/file.h"
 #include "host/cli/device_options.h"
 
+#include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -133,10 +137,64 @@ static void test_a_rig_that_is_not_there_is_named(void **state)
     assert_string_equal(names.port, "as it was");
 }
 
+/* Another process: opens the control socket, says so, sees that somebody waits, then is ready or ends. */
+_Noreturn static void play_starting_rig(const char *folder, const char *text, int opened)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    char path[64];
+    snprintf(address.sun_path, sizeof address.sun_path, "%s/control.sock", folder);
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0 || listen(fd, 4) != 0 ||
+        write(opened, "o", 1) != 1 || accept(fd, NULL, NULL) < 0)
+        _exit(1);
+    snprintf(path, sizeof path, "%s/rig.json", folder);
+    if (!text || weft_file_write(path, text, strlen(text), NULL) != WEFT_OK)
+        _exit(0);
+    for (;;)
+        pause();
+}
+
+/* `weft rig --dir r & weft capture twill.set --rig r` */
+static void test_a_rig_that_is_starting_is_waited_for(void **state)
+{
+    (void)state;
+    char text[300], folder[] = "/tmp/weft-rig-XXXXXX", path[64], byte; /* sockets have short paths */
+    assert_non_null(mkdtemp(folder));
+    snprintf(text, sizeof text,
+             "{\"weft\":\"rig\",\"version\":1,\"pty\":\"/dev/pts/7\",\"camera\":\"aravis:127.0.0.1\","
+             "\"control\":\"x\",\"pid\":%ld}",
+             (long)getpid());
+    for (int ready = 0; ready < 2; ready++) {
+        int opened[2];
+        weft_device_names names;
+        assert_int_equal(pipe(opened), 0);
+        const pid_t rig = fork();
+        if (rig == 0)
+            play_starting_rig(folder, ready ? text : NULL, opened[1]);
+        assert_int_equal(read(opened[0], &byte, 1), 1);
+        const weft_device_options options = {.rig = folder};
+        if (ready)
+            assert_ok(weft_device_options_resolve(&options, &names, err));
+        else
+            assert_fails(weft_device_options_resolve(&options, &names, err), WEFT_ERR_MISSING,
+                         "weft rig --dir");
+        kill(rig, SIGKILL);
+        assert_int_equal(waitpid(rig, NULL, 0), rig);
+        close(opened[0]);
+        close(opened[1]);
+        for (int file = 0; file < 2; file++) {
+            snprintf(path, sizeof path, "%s/%s", folder, file ? "rig.json" : "control.sock");
+            (void)remove(path);
+        }
+    }
+    assert_int_equal(rmdir(folder), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rows_fill_the_embedded_struct),
+        cmocka_unit_test(test_a_rig_that_is_starting_is_waited_for),
         cmocka_unit_test(test_names_come_from_the_options_first),
         cmocka_unit_test(test_a_rigs_camera_by_its_backend),
         cmocka_unit_test(test_a_rig_that_is_not_there_is_named),

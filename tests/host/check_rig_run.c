@@ -275,7 +275,8 @@ static void bad_starts_say_why(void **state)
         {"--scene", "/nonexistent.json", "/nonexistent.json", 1},
         {"--dir", "/proc/version/x", "/proc/version", 1},
         {"--sample", "tweed", "no sample \"tweed\"", 2},
-        {"--address", "203.0.113.7", "203.0.113.7", 1},
+        {"--address", "203.0.113.7", "at 203.0.113.7: no network interface has that address", 1},
+        {"--address", "127.0.0.5", "at 127.0.0.5: no network interface has that address", 1},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *const words_of[] = {

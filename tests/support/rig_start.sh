@@ -1,7 +1,7 @@
 # Sourced by the end-to-end scripts that use the virtual scanner: its lock, its start, its end.
 # shellcheck shell=bash
 [ -x "$WEFT_TEST_BIN/weft-rig" ] || { echo "skipped: this build has no weft-rig"; exit 77; }
-exec 9>/tmp/weft-rig.lock
+exec 9>"${WEFT_RIG_LOCK:-/tmp/weft-rig.lock}"
 flock 9
 rig_pid=
 
