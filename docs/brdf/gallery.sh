@@ -5,7 +5,7 @@ set -euo pipefail
 weft=$(realpath "$1") to=$2
 cd "$to"
 
-quiet() { "$weft" "$@" --force >/dev/null; }
+quiet() { "$weft" "$@" -q --force >/dev/null; } # some F0 are doubtful on purpose
 
 # Spheres on one light, then under a clear sky.
 model_page() { # NAME COLUMNS PARAM...
@@ -13,9 +13,9 @@ model_page() { # NAME COLUMNS PARAM...
     shift 2
     quiet brdf "$name" --plot "$name-lobes.svg" "$@"
     quiet brdf "$name" --plot "$name-slice.png" "$@"
-    quiet preview -q -o "$name.png" --brdf "$name" --columns "$columns" --shape sphere --size 150x150 \
+    quiet preview -o "$name.png" --brdf "$name" --columns "$columns" --shape sphere --size 150x150 \
         --lamp 135,45 --ambient 0 --background 0.05 "$@"
-    quiet preview -q -o "$name-sky.png" --brdf "$name" --columns "$columns" --shape sphere --size 150x150 \
+    quiet preview -o "$name-sky.png" --brdf "$name" --columns "$columns" --shape sphere --size 150x150 \
         --lamp 135,40,1 --sky 135,40 --env-scale 0.5 --tone agx --ambient 0 "$@"
     {
         echo "# $name"
@@ -38,7 +38,7 @@ model_page() { # NAME COLUMNS PARAM...
         echo
         echo '```'
         echo "weft brdf $name --furnace --reciprocity $*"
-        "$weft" brdf "$name" --furnace --reciprocity "$@"
+        "$weft" brdf "$name" -q --furnace --reciprocity "$@"
         echo '```'
     } >"$name.md"
     echo "- [$name]($name.md)" >>index.new
@@ -72,13 +72,13 @@ mv index.new README.md
 
 # Figures of the sources.
 sphere=(--shape sphere --size 150x150 --ambient 0 --background 0.05)
-quiet preview -q -o order-6.png --brdf ggx,cloth --columns $alphas "${sphere[@]}" --lamp 90,5 --param f0=0.3 --param albedo=0.1
+quiet preview -o order-6.png --brdf ggx,cloth --columns $alphas "${sphere[@]}" --lamp 90,5 --param f0=0.3 --param albedo=0.1
 gloss=gloss=0,0.235,0.471,0.706,0.941
-quiet preview -q -o cod-gloss.png --brdf lambert-multiscatter "${sphere[@]}" --columns $gloss --lamp 135,30
-quiet preview -q -o cod-gloss-specular.png --brdf ggx-specular "${sphere[@]}" \
+quiet preview -o cod-gloss.png --brdf lambert-multiscatter "${sphere[@]}" --columns $gloss --lamp 135,30
+quiet preview -o cod-gloss-specular.png --brdf ggx-specular "${sphere[@]}" \
     --columns alpha=1,0.321,0.0742,0.0171,0.00395 --sky 135,40 --lamp 135,40 --tone agx --param f0=0.5
 for area in points representative; do
-    quiet preview -q -o "unreal-13-$area.png" --brdf ggx-specular "${sphere[@]}" --columns alpha=0.02,0.06,0.16,0.36,0.64 \
+    quiet preview -o "unreal-13-$area.png" --brdf ggx-specular "${sphere[@]}" --columns alpha=0.02,0.06,0.16,0.36,0.64 \
         --lamp tube:-90,60,110,90,60,110,0.5 --area $area --param f0=0.3 --tone agx
 done
 "$(dirname "$weft")/weft-figures" .

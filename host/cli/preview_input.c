@@ -52,8 +52,10 @@ static weft_err make_surface(weft_preview_input *input, const char *folder, cons
     };
     WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
-    if (maps->albedo.planes && weft_brdf_find_param(input->surface.brdf, "albedo", NULL))
-        WEFT_TRY(weft_preview_set_map(&input->surface, "albedo", &maps->albedo, err));
+    static const char *const colours[] = {"albedo", "base", "cloth_albedo"};
+    for (int i = 0; i < 3 && maps->albedo.planes; i++)
+        if (weft_brdf_find_param(input->surface.brdf, colours[i], NULL))
+            WEFT_TRY(weft_preview_set_map(&input->surface, colours[i], &maps->albedo, err));
     if (maps->albedo.planes && !maps->albedo_is_srgb)
         weft_warn(
             "%s: the albedo is in the camera's colours; calibrate the colour and solve again to see true "

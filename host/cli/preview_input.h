@@ -28,8 +28,8 @@ typedef struct weft_preview_input {
  * @param brdf    name of a model, or NAME.binary: a table of the MERL form
  * @param folder  NULL: a smooth even surface of the model's parameters, a ball of which has a radius of 50 mm
  * @param params  "name=0.3", "name=r,g,b", or "name=FILE" (EXR, or PNG/TIFF as linear 0..1) of the same size
- * The albedo map becomes the parameter "albedo" where the model has one; a material also gives "f0" (from
- * specular), "alpha" (from roughness), "anisotropy", "front" and "rim".
+ * The albedo map becomes the parameters "albedo", "base" and "cloth_albedo" as the model has them; a material
+ * also gives "f0" (from specular), "alpha" (from roughness), "anisotropy", "front" and "rim".
  */
 weft_err weft_preview_input_load(weft_preview_input *input, const char *folder, const char *brdf,
                                  const weft_texts *params, weft_error *err);

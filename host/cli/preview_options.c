@@ -50,7 +50,8 @@ const weft_field weft_preview_fields[] = {
      .offset = offsetof(weft_preview_options, area),
      .choices = "points|representative",
      .def = "points",
-     .help = "balls and tubes as 24 points, or as the one point of Unreal's notes"},
+     .help =
+         "balls and tubes as 24 points, or as the one point of Unreal's notes (ggx, ggx-specular, beckmann)"},
     {.key = "env",
      .type = WEFT_FIELD_TEXT,
      .offset = offsetof(weft_preview_options, env),

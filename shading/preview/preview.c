@@ -79,7 +79,6 @@ static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
 {
     const weft_preview_view *const view = setup->view;
     const float exposure = (float)exp2(view->exposure_ev), background = (float)view->background;
-    const float ambient = (float)view->ambient;
     weft_preview_set_frame(s);
     for (int c = 0; c < 3; c++)
         memset(s->radiance[c], 0, sizeof s->radiance[c]);
@@ -87,13 +86,10 @@ static void shade(const weft_preview_setup *setup, weft_preview_samples *s)
         weft_preview_add_light(setup, &view->lights[k], s);
     if (view->surroundings.map)
         weft_preview_add_surroundings(setup, s);
-    for (int c = 0; c < 3; c++) {
-        const float *const albedo = setup->albedo_plane >= 0 ? s->param[setup->albedo_plane + c] : NULL;
-        for (int i = 0; i < s->n; i++) {
-            const float lit = s->radiance[c][i] + (albedo ? ambient * albedo[i] : 0);
-            s->value[c][i] = s->hit[i] > 0 ? exposure * lit : background;
-        }
-    }
+    weft_preview_add_ambient(setup, s);
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < s->n; i++)
+            s->value[c][i] = s->hit[i] > 0 ? exposure * s->radiance[c][i] : background;
 }
 
 typedef struct render {
@@ -299,10 +295,11 @@ static void set_ranges(weft_preview_setup *setup)
     const weft_brdf *const brdf = setup->surface->brdf;
     int plane = 0;
     setup->albedo_plane = setup->alpha_plane = -1;
+    setup->matte = weft_preview_matte_of(brdf);
     for (const weft_brdf_param *p = brdf->params; p->name; p++) {
         if (strcmp(p->name, "albedo") == 0 && p->components == 3)
             setup->albedo_plane = plane;
-        if (strcmp(p->name, "alpha") == 0)
+        if (strcmp(p->name, "alpha") == 0 && weft_preview_is_glossy(brdf))
             setup->alpha_plane = plane;
         for (int c = 0; c < p->components; c++, plane++) {
             setup->low[plane] = p->min;

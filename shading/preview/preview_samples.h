@@ -35,8 +35,16 @@ typedef struct weft_preview_samples {
     float radiance[3][WEFT_PREVIEW_RUN];                         /* so far */
 } weft_preview_samples;
 
-/** What is the same for all samples of a picture. */
+/** Planes of the parameters that say what a surface reflects evenly; -1 where the model has none. */
+typedef struct weft_preview_matte {
+    int albedo; /* first of three: "albedo", or "base" */
+    int metallic, cavity;
+    int cloth, cloth_albedo; /* share of the second surface beside the first, and its albedo */
+} weft_preview_matte;
+
 struct weft_preview_visibility;
+
+/** What is the same for all samples of a picture. */
 
 typedef struct weft_preview_setup {
     const weft_preview_surface *surface;
@@ -49,12 +57,23 @@ typedef struct weft_preview_setup {
     double turn_cos, turn_sin; /* of the view's turn */
     double eye_distance;       /* 0: orthographic; plane: output pixels, sphere: radii */
     int albedo_plane;          /* first plane of the parameter "albedo"; -1 when the model has none */
-    int alpha_plane;           /* of "alpha"; -1 when the model has none */
+    int alpha_plane;           /* of "alpha" of a GGX-like lobe; -1 when the model has none */
+    weft_preview_matte matte;
     const struct weft_preview_visibility *visibility;             /* NULL: no shadows but those by formula */
     const weft_preview_texture *texture;                          /* NULL: the maps are sampled */
     weft_environment_planes around;                               /* the view's surroundings; empty without */
     double low[WEFT_BRDF_MAX_PLANES], high[WEFT_BRDF_MAX_PLANES]; /* ranges of the parameters */
 } weft_preview_setup;
+
+weft_preview_matte weft_preview_matte_of(const weft_brdf *brdf);
+
+/** Adds the view's ambient light to the radiance: an even glow that the matte part reflects, albedo
+ *  (1 - metallic), and that a cavity keeps off (S-UE4-11). */
+void weft_preview_add_ambient(const weft_preview_setup *setup, weft_preview_samples *s);
+
+/** Whether the model's lobe stands about the mirrored ray with the width "alpha" or "roughness" squared:
+ *  what the split sum and representative points are made for. */
+bool weft_preview_is_glossy(const weft_brdf *brdf);
 
 /** Scale, camera and sampling density of the view. */
 void weft_preview_setup_shape(weft_preview_setup *setup);

@@ -9,21 +9,27 @@
 
 /* What the split sum needs of a GGX model, from its planes. */
 typedef struct glossy {
-    int albedo, f0, alpha, roughness, base, metallic; /* planes, -1: none */
+    int albedo, f0, alpha, roughness, base, metallic, cavity; /* planes, -1: none */
 } glossy;
 
-static bool glossy_of(const weft_brdf *brdf, glossy *g)
+bool weft_preview_is_glossy(const weft_brdf *brdf)
 {
-    const char *const names[] = {"albedo", "f0", "alpha", "roughness", "base", "metallic"};
-    int *const planes[] = {&g->albedo, &g->f0, &g->alpha, &g->roughness, &g->base, &g->metallic};
     static const char *const models[] = {"ggx", "ggx-specular", "unreal", "beckmann"};
-    bool known = false;
     for (size_t i = 0; i < sizeof models / sizeof models[0]; i++)
-        known |= strcmp(brdf->name, models[i]) == 0;
-    for (int i = 0; i < 6; i++)
+        if (strcmp(brdf->name, models[i]) == 0)
+            return true;
+    return false;
+}
+
+static glossy glossy_of(const weft_brdf *brdf)
+{
+    glossy g;
+    const char *const names[] = {"albedo", "f0", "alpha", "roughness", "base", "metallic", "cavity"};
+    int *const planes[] = {&g.albedo, &g.f0, &g.alpha, &g.roughness, &g.base, &g.metallic, &g.cavity};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
         if (!weft_brdf_find_param(brdf, names[i], planes[i]))
             *planes[i] = -1;
-    return known;
+    return g;
 }
 
 /* Planes of a run on the way from directions to light. */
@@ -78,14 +84,15 @@ static void turn_round(float cosine, float sine, int n, float *x, float *y)
 
 /* Adds light to one channel; parameters that the model has not are planes of a constant. */
 WEFT_CLONES
-static void add_channel(const float *albedo, const float *f0, const around *a, int c, float scale,
-                        weft_preview_samples *s)
+static void add_channel(const float *albedo, const float *f0, const float *open, const around *a, int c,
+                        float scale, weft_preview_samples *s)
 {
     WEFT_INDEPENDENT
     for (int i = 0; i < s->n; i++) {
         const float lobe = f0[i] * a->scale[i] + a->bias[i];
         s->radiance[c][i] +=
-            scale * (albedo[i] * (1 - lobe) * a->irradiance[c][i] * (1 / WEFT_PI) + a->mirrored[c][i] * lobe);
+            scale * open[i] *
+            (albedo[i] * (1 - lobe) * a->irradiance[c][i] * (1 / WEFT_PI) + a->mirrored[c][i] * lobe);
     }
 }
 
@@ -103,6 +110,7 @@ static void split_base(const float *base, const float *metallic, int n, float *a
 static void add_glossy(const weft_preview_setup *setup, const glossy *g, weft_preview_samples *s)
 {
     static const float none[WEFT_PREVIEW_RUN];
+    float ones[WEFT_PREVIEW_RUN];
     const float scale = (float)setup->view->surroundings.scale;
     around a;
     aim_mirror(setup, g, s, &a);
@@ -117,21 +125,24 @@ static void add_glossy(const weft_preview_setup *setup, const glossy *g, weft_pr
     weft_environment_planes_irradiance(&setup->around, s->n, normal, irradiance);
     weft_environment_planes_look(&setup->around, s->n, mirror, a.alpha, mirrored);
     weft_environment_planes_share(&setup->around, s->n, a.nv, a.alpha, a.scale, a.bias);
+    for (int i = 0; i < s->n; i++)
+        ones[i] = 1;
+    const float *const open = g->cavity >= 0 ? s->param[g->cavity] : ones;
     for (int c = 0; c < 3; c++) {
         float albedo[WEFT_PREVIEW_RUN], f0[WEFT_PREVIEW_RUN];
         if (g->base >= 0)
             split_base(s->param[g->base + c], s->param[g->metallic], s->n, albedo, f0);
         const float *const matte = g->albedo >= 0 ? s->param[g->albedo + c] : none;
         const float *const coat = g->f0 >= 0 ? s->param[g->f0 + c] : none;
-        add_channel(g->base >= 0 ? albedo : matte, g->base >= 0 ? f0 : coat, &a, c, scale, s);
+        add_channel(g->base >= 0 ? albedo : matte, g->base >= 0 ? f0 : coat, open, &a, c, scale, s);
     }
 }
 
 bool weft_preview_add_split_sum(const weft_preview_setup *setup, weft_preview_samples *s)
 {
-    glossy g;
-    if (!glossy_of(setup->surface->brdf, &g))
+    if (!weft_preview_is_glossy(setup->surface->brdf))
         return false;
+    const glossy g = glossy_of(setup->surface->brdf);
     add_glossy(setup, &g, s);
     return true;
 }

@@ -27,7 +27,7 @@ static void unreal(int n, const double *const *in, double *const *out)
 {
     for (int i = 0; i < n; i++) {
         const double roughness = in[0][i], f0 = in[1][i], alpha = roughness * roughness;
-        const double values[WEFT_BRDF_MAX_PLANES] = {f0, f0, f0, 1, roughness};
+        const double values[WEFT_BRDF_MAX_PLANES] = {f0, f0, f0, 1, roughness, 1};
         const weft_half h = weft_vectors_half(in[2][i], in[3][i], in[4][i]);
         const double k = weft_schlick_k_unreal(roughness), k_image = weft_schlick_k_ggx(alpha);
         out[0][i] = weft_ggx_d(h.nh, h.s2, alpha);

@@ -19,7 +19,7 @@ const weft_vectors_single weft_vectors_singles[] = {
     {"ord_diffuse", "lambert-coupled", "1 1 1 f0 f0 f0", "nl 0 nv phi", "coupled"},
     {"ord_ggx_aniso", "ggx-anisotropic", "f0 f0 f0 alpha anisotropy", "nl phi_l nv phi_v", "f"},
     {"ord_ggx_spec", "ggx-specular", "f0 f0 f0 alpha", "nl 0 nv phi", "f"},
-    {"ue4_brdf", "unreal", "f0 f0 f0 1 roughness", "nl 0 nv phi", "f"},
+    {"ue4_brdf", "unreal", "f0 f0 f0 1 roughness 1", "nl 0 nv phi", "f"},
     {0},
 };
 

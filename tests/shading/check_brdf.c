@@ -573,6 +573,26 @@ static void test_parameters_are_set_by_name(void **state)
     assert_memory_equal(values, wanted, sizeof wanted);
 }
 
+/* f = diffuse + cavity times the lobe (S-UE4-11). */
+static void test_cavity_shadows_the_lobe(void **state)
+{
+    (void)state;
+    const weft_brdf *brdf;
+    double values[WEFT_BRDF_MAX_PLANES], l[3], v[3], f[3][3];
+    static const char *const cavities[] = {"cavity=0", "cavity=0.25", "cavity=1"};
+    assert_ok(weft_brdf_find("unreal", &brdf, err));
+    weft_brdf_defaults(brdf, values);
+    weft_brdf_direction(0.7, 0, l);
+    weft_brdf_direction(0.6, 3, v);
+    for (int i = 0; i < 3; i++) {
+        assert_ok(weft_brdf_set(brdf, cavities[i], values, err));
+        weft_brdf_eval_one(brdf, values, l, v, f[i]);
+    }
+    assert_near(f[0][1], 0.5 / WEFT_PI, 1e-15);
+    assert_true(f[2][1] > 1.05 * f[0][1]);
+    assert_near(f[1][1], f[0][1] + 0.25 * (f[2][1] - f[0][1]), 1e-15);
+}
+
 static void test_doubts_of_the_specular_workflow(void **state)
 {
     (void)state;
@@ -615,6 +635,7 @@ int main(void)
         cmocka_unit_test(test_logarithm_and_exponential),
         cmocka_unit_test(test_albedos_known_from_elsewhere),
         cmocka_unit_test(test_parameters_are_set_by_name),
+        cmocka_unit_test(test_cavity_shadows_the_lobe),
         cmocka_unit_test(test_doubts_of_the_specular_workflow),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

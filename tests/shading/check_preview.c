@@ -66,6 +66,62 @@ static void test_flat_plane(void **state)
     weft_image_fini(&albedo);
 }
 
+static void set_params(weft_preview_surface *surface, const char *const *texts)
+{
+    for (; *texts; texts++)
+        assert_ok(weft_brdf_set(surface->brdf, *texts, surface->params, err));
+}
+
+/* The even glow alone: what each model reflects of it is its matte part. */
+static void test_ambient_light(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *model, *params[6];
+        double matte;
+    } rows[] = {
+        {"ggx", {"albedo=0.3"}, 0.3},
+        {"ggx-specular", {NULL}, 0},
+        {"unreal", {"base=0.6", "metallic=0.25", "cavity=0.5"}, 0.6 * 0.75 * 0.5},
+        {"disney", {"base=0.6", "metallic=0.25"}, 0.6 * 0.75},
+        {"ggx-cloth", {"albedo=0.2", "cloth_albedo=0.6", "cloth=0.25"}, 0.3},
+    };
+    for (size_t m = 0; m < sizeof rows / sizeof rows[0]; m++) {
+        weft_preview_surface surface = surface_of(rows[m].model, 4, 4);
+        weft_preview_view view = view_of(4, 4, 0, 90);
+        weft_image picture;
+        view.n_lights = 0;
+        view.ambient = 0.4;
+        set_params(&surface, rows[m].params);
+        assert_ok(weft_preview_render(&surface, &view, &picture, err));
+        assert_near(pixel(&picture, 1, 2, 2), 0.4 * rows[m].matte, 1e-6);
+        weft_image_fini(&picture);
+    }
+}
+
+/* Ball lamps with lobes that do not stand about the mirrored ray keep their 24 points. */
+static void test_representative_point_is_for_glossy_models(void **state)
+{
+    (void)state;
+    static const char *const models[] = {"ggx", "cloth", "ggx-cloth", "charlie", "unreal"};
+    for (int m = 0; m < 5; m++) {
+        weft_preview_surface surface = surface_of(models[m], 12, 12);
+        weft_preview_view view = view_of(12, 12, 0, 90);
+        weft_image points, representative;
+        surface.mm_per_px = 1;
+        view.lights[0].kind = WEFT_PREVIEW_BALL;
+        view.lights[0].position_mm[2] = 30;
+        view.lights[0].radius_mm = 15;
+        assert_ok(weft_preview_render(&surface, &view, &points, err));
+        view.lights[0].area = WEFT_PREVIEW_REPRESENTATIVE;
+        assert_ok(weft_preview_render(&surface, &view, &representative, err));
+        const bool same = memcmp(points.data, representative.data, 3 * 144 * sizeof *points.data) == 0;
+        assert_true(same == (m > 0));
+        weft_image_fini(&points);
+        weft_image_fini(&representative);
+    }
+}
+
 /* A point light: E D^2/r^2 cos at each place, in mm. */
 static void test_point_light(void **state)
 {
@@ -559,6 +615,8 @@ int main(void)
         cmocka_unit_test(test_fine_weaves_do_not_beat),
         cmocka_unit_test(test_threads_do_not_change_it),
         cmocka_unit_test(test_area_lights),
+        cmocka_unit_test(test_ambient_light),
+        cmocka_unit_test(test_representative_point_is_for_glossy_models),
         cmocka_unit_test(test_representative_point),
         cmocka_unit_test(test_even_surroundings),
         cmocka_unit_test(test_room_on_cloth),
