@@ -16,5 +16,5 @@ flash_until_writing
 tell uno power
 ended 1 'the board fell silent while it was written'
 tail -n 1 uno.out | grep -q '^0 ' || die "lights are on: $(tail -n 1 uno.out)"
-expect 0 'settings  unknown before: serial (none), 10 lights' patiently "$weft" flash --port "$pty"
+expect_patiently 0 'settings  unknown before: serial (none), 10 lights' "$weft" flash --port "$pty"
 exit 0

@@ -38,20 +38,18 @@ tell() {
     echo "$@" >&"${!name}"
 }
 
-# patiently COMMAND...: on a machine with far more work than processors a bootloader gives up, as it should, before
-# avrdude has its turn; then again, as weft flash says.  Elsewhere, and whatever else it says, once.
-patiently() {
-    local status tries=0
-    while true; do
+# expect_patiently STATUS WORDS COMMAND...: on a machine with far more work than processors a bootloader gives up, as
+# it should, before avrdude has its turn; then again, as weft flash says.  Elsewhere once.  $tries is how many it took:
+# a flashing that was broken off leaves no firmware for the next one to compare with.
+expect_patiently() {
+    local status
+    for tries in 1 2 3 4 5 6 7 8; do
+        awk -v n="$(nproc)" '{ exit !($1 > n) }' /proc/loadavg || break
         status=0
-        "$@" >try.out 2>try.err || status=$?
-        tries=$((tries + 1))
-        { grep -q 'answer' try.err && [ $tries -lt 8 ] &&
-            awk -v n="$(nproc)" '{ exit !($1 > n) }' /proc/loadavg; } || break
+        "${@:3}" >out 2>&1 || status=$?
+        [ "$status" = "$1" ] && grep -qF -- "$2" out && return
     done
-    cat try.out
-    cat try.err >&2
-    return $status
+    expect "$@"
 }
 
 # starts flashing $pty in the background and waits until avrdude writes
