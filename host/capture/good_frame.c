@@ -17,9 +17,7 @@
 #define BRIGHTER_OFFSET 0.0005
 /* Clipped photosites of one colour that are worth a warning. */
 #define CLIPPED_SHARE 0.001
-/* On the virtual scanner the frames of one light differ in shape by 0.0008 at most, exposures a factor of 16
- * apart among them, those of two lights by 0.077 at least (white sheet, satin, denim at 616 x 408). */
-#define SAME_SHAPE  0.005
+/* Exposures of one light that differ by more in shape (see WEFT_PRINT_SAME_SHAPE) are of two. */
 #define OTHER_SHAPE 0.03
 /* A room this bright costs range and adds its own noise. */
 #define BRIGHT_ROOM 0.05
@@ -59,7 +57,7 @@ static void check_shape(const weft_capture_state *run, const weft_planned_frame 
                 "another picture than its exposure of %g s (they differ by %.1f %%): was another lamp on, or "
                 "did the sample move?",
                 run->prints[light].time / run->shooter.frame.gain, 100 * d);
-        else if (light != frame->light && frame->middle && d < SAME_SHAPE)
+        else if (light != frame->light && frame->middle && d < WEFT_PRINT_SAME_SHAPE)
             snprintf(
                 shot->reason, sizeof shot->reason,
                 "the same picture as under light %d (they differ by %.2f %%): does its wire go to that lamp?",

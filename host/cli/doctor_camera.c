@@ -1,4 +1,5 @@
 /* Checks of the camera, and of the lamps by what it sees. */
+#include "host/capture/light_print.h"
 #include "host/capture/shoot.h"
 #include "host/cli/device_open.h"
 #include "host/cli/doctor.h"
@@ -114,10 +115,17 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Every lamp alone: how much brighter than dark the picture is. */
-static weft_err walk(weft_shooter *s, int n, double *dark, double rise[MAX_LAMPS], weft_error *err)
+/* What the camera saw of the lamps: how much brighter than dark the picture is, and whose light it shows. */
+typedef struct lamp_walk {
+    int n;
+    double dark, rise[MAX_LAMPS];
+    weft_light_print dark_print, prints[MAX_LAMPS];
+} lamp_walk;
+
+/* Every lamp alone. */
+static weft_err walk(weft_shooter *s, lamp_walk *w, weft_error *err)
 {
-    for (int i = -1; i < n; i++) {
+    for (int i = -1; i < w->n; i++) {
         weft_shot shot;
         for (int k = 0; k < 3; k++) { /* a first frame, or a busy network, may fail once */
             WEFT_TRY(weft_shoot(s, i < 0 ? 0 : 1u << i, exposure_s, 1, &shot, err));
@@ -126,60 +134,90 @@ static weft_err walk(weft_shooter *s, int n, double *dark, double rise[MAX_LAMPS
         }
         if (shot.reason[0])
             return weft_fail(err, WEFT_ERR_DEVICE, "lamp %d: %s", i, shot.reason);
-        if (i < 0)
-            *dark = shot.stats.mean;
-        else
-            rise[i] = shot.stats.mean - *dark;
+        const weft_light_print print =
+            weft_light_print_make(&s->frame.mosaic, s->frame.exposure_s * s->frame.gain);
+        if (i < 0) {
+            w->dark = shot.stats.mean;
+            w->dark_print = print;
+        } else {
+            w->rise[i] = shot.stats.mean - w->dark;
+            w->prints[i] = print;
+        }
     }
     return WEFT_OK;
 }
 
-static void judge(double room, const double rise[MAX_LAMPS], int n, weft_doctor_result *result)
+/* Two wires to one lamp: " 7 and 8"; empty when there are none. */
+static void find_twins(const lamp_walk *w, char *list, size_t size)
+{
+    list[0] = '\0';
+    for (int i = 0; i < w->n; i++)
+        for (int k = i + 1; k < w->n; k++) {
+            const double d = weft_light_print_difference(&w->prints[i], &w->prints[k], &w->dark_print);
+            const size_t used = strlen(list);
+            if (d >= 0 && d < WEFT_PRINT_SAME_SHAPE)
+                snprintf(list + used, size - used, "%s %d and %d", used ? "," : "", i, k);
+        }
+}
+
+/* " 3, 5" */
+static void add_lamp(char list[100], int lamp)
+{
+    const size_t used = strlen(list);
+    snprintf(list + used, 100 - used, "%s %d", used ? "," : "", lamp);
+}
+
+static void judge(const lamp_walk *w, weft_doctor_result *result)
 {
     double sorted[MAX_LAMPS];
-    char dark[100] = "", weak[100] = "";
-    if (n < 1) {
+    char dark[100] = "", weak[100] = "", twins[100];
+    if (w->n < 1) {
         weft_doctor_say(result, WEFT_DOCTOR_FAILED, "weft light set lights 10", "the controller has none");
         return;
     }
-    memcpy(sorted, rise, (size_t)n * sizeof sorted[0]);
-    qsort(sorted, (size_t)n, sizeof sorted[0], by_value);
-    for (int i = 0; i < n; i++) {
-        char *const list = rise[i] < least_rise ? dark : weak;
-        const size_t used = strlen(list);
-        if (rise[i] < least_rise || rise[i] < least_share * sorted[n / 2])
-            snprintf(list + used, 100 - used, " %d", i);
-    }
-    if (dark[0] && room > most_room * sorted[n / 2])
+    memcpy(sorted, w->rise, (size_t)w->n * sizeof sorted[0]);
+    qsort(sorted, (size_t)w->n, sizeof sorted[0], by_value);
+    const double middle = sorted[w->n / 2];
+    for (int i = 0; i < w->n; i++)
+        if (w->rise[i] < least_rise)
+            add_lamp(dark, i);
+        else if (w->rise[i] < least_share * middle)
+            add_lamp(weak, i);
+    find_twins(w, twins, sizeof twins);
+    if (dark[0] && w->dark > most_room * middle)
         weft_doctor_say(
             result, WEFT_DOCTOR_FAILED,
             "a lamp that always shines: replace its MOSFET (docs/hardware.md); or room light: darken it",
             "with all lamps off the picture is not dark (%.1f %% of the range), and it gets no lighter by%s",
-            100 * room, dark);
+            100 * w->dark, dark);
     else if (dark[0])
         weft_doctor_say(
             result, WEFT_DOCTOR_FAILED,
             "check the LED's 12 V, its polarity, its AND gate and MOSFET (docs/hardware.md), and that the "
             "lens cap is off",
             "the camera sees no light of%s", dark);
-    else if (room > most_room * sorted[n / 2])
+    else if (twins[0])
+        weft_doctor_say(result, WEFT_DOCTOR_FAILED,
+                        "follow the wires of both from the Arduino's pins to the LEDs",
+                        "the same lamp shines for%s", twins);
+    else if (w->dark > most_room * middle)
         weft_doctor_say(result, WEFT_DOCTOR_WARNING, "darken the room",
                         "with all lamps off the picture has %.1f %% of the range, with one on %.1f %% more",
-                        100 * room, 100 * sorted[n / 2]);
+                        100 * w->dark, 100 * middle);
     else if (weak[0])
         weft_doctor_say(result, WEFT_DOCTOR_WARNING,
                         "check its resistor and its aim, then calibrate the lights",
                         "much weaker than the others:%s", weak);
     else
-        weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%d lamps, %.1f to %.1f %% of the range above dark", n,
-                        100 * sorted[0], 100 * sorted[n - 1]);
+        weft_doctor_say(result, WEFT_DOCTOR_OK, NULL, "%d lamps, %.1f to %.1f %% of the range above dark",
+                        w->n, 100 * sorted[0], 100 * sorted[w->n - 1]);
 }
 
 void weft_doctor_lamps(weft_doctor *doctor, weft_doctor_result *result)
 {
     weft_error why = {0};
     weft_shooter shooter = {.settle_s = settle_s, .deadline_s = frame_deadline_s};
-    double dark = 0, rise[MAX_LAMPS];
+    lamp_walk seen = {.n = doctor->info.n_lights < MAX_LAMPS ? doctor->info.n_lights : MAX_LAMPS};
     if (!doctor->walk || !doctor->camera[0] || !doctor->info.firmware[0]) {
         weft_doctor_say(result, WEFT_DOCTOR_SKIPPED, NULL, "%s",
                         doctor->walk ? "needs controller and camera"
@@ -192,14 +230,13 @@ void weft_doctor_lamps(weft_doctor *doctor, weft_doctor_result *result)
     if (status == WEFT_OK)
         status = weft_device_open_controller(&names, &shooter.controller, &why);
     if (status == WEFT_OK) {
-        const int n = doctor->info.n_lights < MAX_LAMPS ? doctor->info.n_lights : MAX_LAMPS;
         shooter.level = doctor->info.level_max;
         weft_controller_panic_on_crash(shooter.controller);
         weft_shooter_begin(&shooter);
-        status = walk(&shooter, n, &dark, rise, &why);
+        status = walk(&shooter, &seen, &why);
         weft_shooter_end(&shooter);
         if (status == WEFT_OK)
-            judge(dark, rise, n, result);
+            judge(&seen, result);
     }
     if (status != WEFT_OK)
         weft_doctor_say(result, WEFT_DOCTOR_FAILED, NULL, "%s", why.text);

@@ -49,6 +49,12 @@ expect 1 'failed' "$weft" doctor --rig r --lamps
 line FAILED lamps 'a lamp that always shines'
 tell board lamp 3 good
 
+# A wire that goes to another's lamp.
+tell board lamp 7 as 8
+expect 1 'failed' "$weft" doctor --rig r --lamps
+line FAILED lamps 'the same lamp shines for 7 and 8;'
+tell board lamp 7 good
+
 # A bad cable, another program, a port that is not there.
 tell board line both flip 0.003 seed 3
 expect 1 'failed' "$weft" doctor --rig r
