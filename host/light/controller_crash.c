@@ -41,8 +41,11 @@ void weft_controller_watch_crash(int fd)
     action.sa_sigaction = on_deadly;
     action.sa_flags = SA_SIGINFO;
     sigfillset(&action.sa_mask);
-    for (int i = 0; i < N_DEADLY; i++)
-        sigaction(deadly[i], &action, &before[i]);
+    for (int i = 0; i < N_DEADLY; i++) {
+        sigaction(deadly[i], NULL, &before[i]);
+        if (before[i].sa_handler != SIG_IGN) /* under nohup, a SIGHUP is no death */
+            sigaction(deadly[i], &action, NULL);
+    }
 }
 
 bool weft_controller_forget_crash(int fd)

@@ -4,7 +4,8 @@
 
 #include <stdbool.h>
 
-/** From now on a deadly signal writes the panic bytes to `fd`, and then does what it did before. */
+/** From now on a deadly signal writes the panic bytes to `fd`, and then does what it did before.  One that is
+ *  ignored (SIGHUP under nohup) stays ignored. */
 void weft_controller_watch_crash(int fd);
 /** No longer, if `fd` is the one.  @return whether it was */
 bool weft_controller_forget_crash(int fd);

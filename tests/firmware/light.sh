@@ -81,6 +81,20 @@ hold on 0
 kill -KILL $holder
 ended 137 2>/dev/null
 
+# the terminal is closed: dark; under nohup, lit
+hold on 0
+kill -HUP $holder
+ended 129 2>/dev/null
+trap '' HUP
+hold on 2
+trap - HUP
+kill -HUP $holder
+sleep 0.3
+lights
+[ "$mask" = 4 ] || fail "a SIGHUP that is ignored leaves lights $mask"
+kill -INT $holder
+ended 0
+
 # cancelled before its time
 hold on 1 --seconds 30
 kill -TERM $holder
