@@ -190,6 +190,22 @@ weft_err weft_json_get_object(const json_t *object, const char *key, weft_json_n
     return find(object, key, need, is_object, "an object", member, place, err);
 }
 
+weft_err weft_json_refuse_unknown(const json_t *object, const char *const *known, const char *of,
+                                  const char *place, weft_error *err)
+{
+    const char *key;
+    const json_t *value;
+    json_object_foreach((json_t *)object, key, value)
+    {
+        const char *const *k = known;
+        while (*k && strcmp(*k, key) != 0)
+            k++;
+        if (!*k)
+            return weft_fail(err, WEFT_ERR_FORMAT, "%s: \"%s\" is not a key of %s", place, key, of);
+    }
+    return WEFT_OK;
+}
+
 json_t *weft_json_numbers(const double *values, int n)
 {
     json_t *const array = json_array();

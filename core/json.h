@@ -43,6 +43,10 @@ weft_err weft_json_get_array(const json_t *object, const char *key, weft_json_ne
                              const char *place, weft_error *err);
 weft_err weft_json_get_object(const json_t *object, const char *key, weft_json_need need,
                               const json_t **member, const char *place, weft_error *err);
+/** Fails on a key that is not among `known` (NULL-ended): a misspelt one would silently leave its default.
+ *  `of` says of what it is none: "a scene; docs/virtual-scanner.md lists them". */
+weft_err weft_json_refuse_unknown(const json_t *object, const char *const *known, const char *of,
+                                  const char *place, weft_error *err);
 
 /** An array of `n` numbers; NULL without memory. */
 json_t *weft_json_numbers(const double *values, int n);

@@ -136,7 +136,10 @@ static weft_err say_lit(const weft_invocation *inv, const weft_controller_info *
                                          (json_int_t)info->tick_hz),
                                err);
     print_mask(mask, list, sizeof list);
-    fprintf(inv->out, "on: %s at %.3g %%\n", list, 100.0 * level / info->level_max);
+    if (level == 0)
+        fprintf(inv->out, "off: %s\n", list);
+    else
+        fprintf(inv->out, "on: %s at %.3g %%\n", list, 100.0 * level / info->level_max);
     if (fflush(inv->out) != 0)
         return weft_fail_errno(err, WEFT_ERR_IO, "the result cannot be written");
     return WEFT_OK;
@@ -193,7 +196,13 @@ static weft_err light_and_hold(const weft_invocation *inv, const light_args *arg
     uint32_t on_tick = 0, off_tick = 0;
     if (mask == UINT32_MAX)
         mask = info->n_lights < MAX_LIGHTS ? (1u << info->n_lights) - 1 : UINT32_MAX;
-    weft_err status = weft_controller_light(c, mask, level, max_on_ms, &on_tick, err);
+    weft_err status = WEFT_OK;
+    if (level == 0 && percent > 0)
+        status = weft_fail(err, WEFT_ERR_RANGE,
+                           "%g %% would be dark: the least light of this controller is %.2g %%", percent,
+                           100.0 / info->level_max);
+    if (status == WEFT_OK)
+        status = weft_controller_light(c, mask, level, max_on_ms, &on_tick, err);
     if (status == WEFT_OK)
         status = say_lit(inv, info, mask, level, on_tick, err);
     if (status == WEFT_OK)
@@ -351,7 +360,7 @@ const weft_command weft_cmd_light_level = {
     .args_size = sizeof(light_args),
     .fields = hold_fields,
     .details = "PERCENT is the share of full brightness, 0 to 100, to the nearest step of the "
-               "controller.\n" HOW_LIGHTS_END,
+               "controller (1/256).\n" HOW_LIGHTS_END,
     .example = "weft light level 0-9 12.5 --rig /tmp/rig",
     .run = run_level,
 };

@@ -58,8 +58,11 @@ static weft_err read_us(const json_t *object, const char *key, weft_json_need ne
 static weft_err read_step(const json_t *object, int level_max, weft_controller_step *step, const char *place,
                           weft_error *err)
 {
+    static const char *const known[] = {"lights",  "level",  "settle_ms", "trigger_ms",
+                                        "hold_ms", "gap_ms", "until",     NULL};
     double percent = 100;
     const char *until = "time";
+    WEFT_TRY(weft_json_refuse_unknown(object, known, "a step; weft light run --help lists them", place, err));
     WEFT_TRY(read_lights(object, &step->lights, place, err));
     WEFT_TRY(weft_json_get_number(object, "level", WEFT_JSON_OPTIONAL, 0, 100, &percent, place, err));
     WEFT_TRY(read_us(object, "settle_ms", WEFT_JSON_OPTIONAL, 2, &step->settle_us, place, err));

@@ -23,7 +23,7 @@ static weft_err nobody_there(const weft_controller *c, weft_error *err)
                          "Weft firmware (\"weft flash\" brings it)?",
                          c->serial.name, hello_within_s);
     return weft_fail(err, WEFT_ERR_PROTOCOL,
-                     "%s: something answers, but it is no Weft light controller (%zu bytes without sense); "
+                     "%s: something answers, but it is no Weft light controller (bytes without sense: %zu); "
                      "try another port, or flash the firmware (weft flash)",
                      c->serial.name, c->n_bytes);
 }

@@ -28,6 +28,7 @@ typedef struct avrdude {
     int out; /* its stdout and stderr */
     int status;
     bool stopped, cancelled;
+    bool baud_is_given;    /* by the user: no other was tried */
     char said[SAID_BYTES]; /* all that it said, NUL behind it; the rest is dropped */
     size_t n_said, line_at;
     weft_progress progress;
@@ -223,22 +224,23 @@ static weft_err why_failed(const avrdude *a, weft_error *err)
                                a->port)
                    : weft_fail(
                          err, WEFT_ERR_TIMEOUT,
-                         "%s: no bootloader answers; is this the light controller's port?  A board without "
+                         "%s: no bootloader answers; is this the light controller's port%s?  A board without "
                          "a working bootloader needs one first (Arduino IDE: Tools, Burn Bootloader)",
-                         a->port);
+                         a->port, a->baud_is_given ? ", and --baud its rate" : "");
     return last_words(a, err);
 }
 
 /* -- the whole ------------------------------------------------------------------------------------------ */
 
-static weft_err write_at(const char *port, const weft_flash_image *image, int baud, int reservation,
-                         bool *silent, weft_error *err)
+static weft_err write_at(const char *port, const weft_flash_image *image, int baud, bool baud_is_given,
+                         int reservation, bool *silent, weft_error *err)
 {
     avrdude *const a = weft_alloc(1, sizeof *a, err);
     if (!a)
         return WEFT_ERR_NOMEM;
     a->port = port;
     a->image = image;
+    a->baud_is_given = baud_is_given;
     weft_err status = begin(a, reservation, baud, err);
     if (status == WEFT_OK) {
         listen_to(a);
@@ -265,7 +267,7 @@ weft_err weft_flash_write(const char *port, const weft_flash_image *image, int b
         weft_error why = {0};
         *used = baud ? baud : usual[i];
         weft_explain("%s: asking for the bootloader at %d baud", port, *used);
-        status = write_at(port, image, *used, reservation, &silent, &why);
+        status = write_at(port, image, *used, baud != 0, reservation, &silent, &why);
         if (err && status != WEFT_OK)
             *err = why;
     }

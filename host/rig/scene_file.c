@@ -22,24 +22,7 @@ void weft_rig_setup_init(weft_rig_setup *setup)
     };
 }
 
-/* A misspelt key would silently leave its default: refuse it. */
-static weft_err refuse_unknown(const json_t *object, const char *const *known, const char *place,
-                               weft_error *err)
-{
-    const char *key;
-    const json_t *value;
-    json_object_foreach((json_t *)object, key, value)
-    {
-        const char *const *k = known;
-        while (*k && strcmp(*k, key) != 0)
-            k++;
-        if (!*k)
-            return weft_fail(err, WEFT_ERR_FORMAT,
-                             "%s: \"%s\" is not a key of a scene; docs/virtual-scanner.md lists them", place,
-                             key);
-    }
-    return WEFT_OK;
-}
+static const char of_a_scene[] = "a scene; docs/virtual-scanner.md lists them";
 
 static weft_err load_light(const json_t *object, const char *file, int i, weft_rig_setup *setup,
                            weft_error *err)
@@ -49,7 +32,7 @@ static weft_err load_light(const json_t *object, const char *file, int i, weft_r
     snprintf(place, sizeof place, "%s: light %d", file, i);
     if (!json_is_object(object))
         return weft_fail(err, WEFT_ERR_FORMAT, "%s must be an object", place);
-    WEFT_TRY(refuse_unknown(object, known, place, err));
+    WEFT_TRY(weft_json_refuse_unknown(object, known, of_a_scene, place, err));
     double position[3], axis[3], exponent = 1.2, power = 1, pump = 1;
     WEFT_TRY(weft_json_get_numbers(object, "position_mm", WEFT_JSON_REQUIRED, 3, position, place, err));
     const double distance =
@@ -93,7 +76,7 @@ static weft_err load_sheet(const json_t *object, const char *file, weft_rig_shee
     static const double most[] = {20, 30, 500, 2000};
     char place[512];
     snprintf(place, sizeof place, "%s: sheet", file);
-    WEFT_TRY(refuse_unknown(object, known, place, err));
+    WEFT_TRY(weft_json_refuse_unknown(object, known, of_a_scene, place, err));
     for (int k = 0; known[k]; k++) {
         WEFT_TRY(weft_json_get_numbers(object, known[k], WEFT_JSON_OPTIONAL, 2, values[k], place, err));
         if (!(fabs(values[k][0]) <= most[k] && fabs(values[k][1]) <= most[k]))
@@ -124,7 +107,7 @@ static weft_err load_scene(const json_t *object, const char *file, weft_rig_setu
         "weft",       "version",         "seed",   "noise",       "light_jitter_mm", "aim_jitter_deg",
         "room_light", "interreflection", "lights", "light_drift", "strip_mm",        "sheet",
         NULL};
-    WEFT_TRY(refuse_unknown(object, known, file, err));
+    WEFT_TRY(weft_json_refuse_unknown(object, known, of_a_scene, file, err));
     int seed = (int)setup->seed;
     WEFT_TRY(weft_json_get_int(object, "seed", WEFT_JSON_OPTIONAL, 0, 2147483647, &seed, file, err));
     setup->seed = (uint64_t)seed;

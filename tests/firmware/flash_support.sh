@@ -38,13 +38,16 @@ tell() {
     echo "$@" >&"${!name}"
 }
 
+# whether the machine has more work than processors
+is_busy() { awk -v n="$(nproc)" '{ exit !($1 > n) }' /proc/loadavg; }
+
 # expect_patiently STATUS WORDS COMMAND...: on a machine with far more work than processors a bootloader gives up, as
 # it should, before avrdude has its turn; then again, as weft flash says.  Elsewhere once.  $tries is how many it took:
 # a flashing that was broken off leaves no firmware for the next one to compare with.
 expect_patiently() {
     local status
     for tries in 1 2 3 4 5 6 7 8; do
-        awk -v n="$(nproc)" '{ exit !($1 > n) }' /proc/loadavg || break
+        is_busy || break
         status=0
         "${@:3}" >out 2>&1 || status=$?
         [ "$status" = "$1" ] && grep -qF -- "$2" out && return

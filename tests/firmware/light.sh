@@ -114,6 +114,8 @@ expect 2 'names no lights' "$weft" light on 3,x --port "$pty"
 expect 2 'names no lights' "$weft" light on 5-3 --port "$pty"
 expect 2 'names no lights' "$weft" light on -- -1
 expect 2 'no level' "$weft" light level 1 101 --port "$pty"
+expect 1 'the least light of this controller is 0.39 %' "$weft" light level 1 0.1 --port "$pty"
+expect 0 'off: 1' "$weft" light level 1 0 --seconds 0.01 --port "$pty"
 expect 2 'no level' "$weft" light level 1 nan --port "$pty"
 expect 2 'LIGHTS' "$weft" light on
 expect 1 'there is no such port' "$weft" light status --port /dev/ttyNOT

@@ -55,6 +55,8 @@ echo '{"weft":"sequence","version":1,"steps":[{"lights":[1],"hold_ms":2001}]}' >
 expect 1 'at most 2000 ms' "$weft" light run "$dir/bad.json" --port "$pty"
 echo '{"weft":"sequence","version":1,"steps":[{"lights":[12],"hold_ms":1}]}' >"$dir/bad.json"
 expect 1 'no light 12' "$weft" light run "$dir/bad.json" --port "$pty"
+echo '{"weft":"sequence","version":1,"steps":[{"lights":[1],"hold_ms":5,"setle_ms":9}]}' >"$dir/bad.json"
+expect 1 '"setle_ms" is not a key of a step' "$weft" light run "$dir/bad.json" --port "$pty"
 
 # settings
 expect 0 'serial (none)' "$weft" light set serial --port "$pty"
