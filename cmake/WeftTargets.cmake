@@ -46,7 +46,7 @@ endfunction()
 
 function(weft_test_properties name timeout serial)
   if(NOT timeout)
-    set(timeout 300) # generous: a busy machine is no failure
+    set(timeout 600) # generous: a busy machine is no failure
   endif()
   set(sanitized) # "1": scripts repeat what is slow less often
   if(WEFT_SANITIZE)

@@ -191,7 +191,7 @@ weft_err weft_controller_run_sequence(weft_controller *c, const weft_controller_
     weft_err status = start(c, n, r.id, err);
     if (status == WEFT_OK)
         status =
-            wait_for_end(c, &r, weft_clock_s() + 20e-6 * us + 5, err); /* a simulated board may be slow */
+            wait_for_end(c, &r, weft_clock_s() + 20e-6 * us + 20, err); /* a simulated board may be slow */
     if (status != WEFT_OK)
         abort_run(c);
     return status;

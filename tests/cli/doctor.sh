@@ -62,8 +62,7 @@ line FAILED 'serial line' 'a shorter or better USB cable'
 tell board line both
 sleep 30 7<>"$(jq -r .pty r/rig.json)" 9>&- &
 other=$!
-for _ in $(seq 100); do
-    [ "$(cat /proc/$other/comm 2>/dev/null)" = sleep ] && break # and has the port open
+until [ "$(cat /proc/$other/comm)" = sleep ]; do # and has the port open
     sleep 0.05
 done
 expect 1 '"verdict":"failed"' "$weft" doctor --rig r --json

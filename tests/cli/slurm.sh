@@ -63,14 +63,14 @@ trap finish EXIT
 munged -F -f --key-file=munge/key --socket=munge/socket --pid-file=munge/pid --seed-file=munge/seed \
     --log-file=munge/log --num-threads=2 >log/munged 2>&1 &
 daemons+=($!)
-for _ in $(seq 50); do [ -S munge/socket ] && break; sleep 0.1; done
+for _ in $(seq 300); do [ -S munge/socket ] && break; sleep 0.1; done
 slurmctld -D -c >log/ctld 2>&1 &
 daemons+=($!)
 for node in n1 n2; do
     slurmd -D -N $node >log/$node 2>&1 &
     daemons+=($!)
 done
-for _ in $(seq 100); do
+for _ in $(seq 300); do
     [ "$(sinfo -h -N -t idle -o %N 2>/dev/null | wc -l)" -eq 2 ] && break
     sleep 0.2
 done

@@ -215,7 +215,7 @@ static void test_nobody_answers(void **state)
     assert_fails(weft_controller_open(pty_path, 1000, &c, err), WEFT_ERR_TIMEOUT,
                  "nobody answers within 3 s");
     const double took_s = weft_clock_s() - begin_s;
-    assert_true(took_s > 2.9 && took_s < 10);
+    assert_true(took_s > 2.9 && took_s < 30);
 }
 
 static void test_firmware_of_another_protocol(void **state)

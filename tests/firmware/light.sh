@@ -27,11 +27,11 @@ hold() {
     rm -f "$dir/on" "$dir/note"
     "$weft" light "$@" --port "$pty" >"$dir/on" 2>"$dir/note" &
     holder=$!
-    for _ in $(seq 300); do
+    while kill -0 $holder 2>/dev/null; do
         grep -q '^on' "$dir/on" 2>/dev/null && return
         sleep 0.05
     done
-    fail "light $*: not on after 15 s: $(cat "$dir/note")"
+    fail "light $*: not on: $(cat "$dir/note")"
 }
 # ended STATUS: the lights held in the background have ended so
 ended() {
@@ -39,7 +39,7 @@ ended() {
     local got=$?
     holder=
     [ $got = "$1" ] || fail "ended with $got, wanted $1: $(cat "$dir/note")"
-    for _ in $(seq 100); do
+    for _ in $(seq 600); do
         lights
         [ "$mask" = 0 ] && return
         sleep 0.05

@@ -77,7 +77,7 @@ expect 0 'max-on 2000' "$weft" light set max-on --port "$pty"
 # a live view, until it is interrupted
 "$weft" light status --watch --port "$pty" >"$dir/watch" 2>"$dir/err" &
 watcher=$!
-for _ in $(seq 300); do
+for _ in $(seq 1200); do
     [ "$(grep -c 'IDLE.*lights none' "$dir/watch")" -ge 3 ] && break
     sleep 0.05
 done

@@ -5,7 +5,7 @@
 set -u
 # shellcheck source=tests/support/rig.sh
 . "$WEFT_TEST_SOURCE/tests/support/rig.sh"
-export WEFT_CAMERA_PATIENCE=3
+export WEFT_CAMERA_PATIENCE=$((2 + patience))
 capture=("$weft" capture --rig "$dir/rig" -q --exposure 0.02)
 
 # The helpers of the cameras that programs of this test have, by process id.
@@ -128,9 +128,12 @@ pid=$!
 wait_for_frames "$dir/program.set" 2
 kill -KILL $pid
 wait $pid 2>/dev/null
-sleep 1.2
+for _ in $(seq 600); do
+    [ -n "$(helpers)" ] || break
+    sleep 0.05
+done
 [ -z "$(helpers)" ] || fail "kill -9: the helper lives on"
-expect_dark "kill -9 of the program"
+await_dark "kill -9 of the program"
 expect 0 '"frames":11' "${capture[@]}" --exposure 0.3 "$dir/program.set" --resume --json
 check_files "$dir/program.set" complete 11
 row "kill -9 of the program"

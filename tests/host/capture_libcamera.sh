@@ -8,7 +8,7 @@ command -v umockdev-run >/dev/null || { echo "skipped: umockdev is not installed
 # shellcheck source=tests/support/rig.sh
 . "$WEFT_TEST_SOURCE/tests/support/rig.sh"
 export WEFT_SENSOR_RIG=$dir/rig/control.sock WEFT_SENSOR_SIZE=616x408 WEFT_SENSOR_FAULT=$dir/fault
-export WEFT_CAMERA_PATIENCE=5
+export WEFT_CAMERA_PATIENCE=$((4 + patience))
 id='libcamera:\_SB_.PCI0.XHC_-2:1.0-0bda:5e1f'
 
 with_sensor() { # COMMAND...: runs it where the sensor is plugged in

@@ -48,8 +48,7 @@ for _ in $(seq 100); do
 done
 kill -KILL $pid
 wait $pid 2>/dev/null
-sleep 1.2
-expect_dark SIGKILL
+await_dark SIGKILL
 jq -e '.dark_for_s > 0' "$dir/state" >/dev/null || fail "SIGKILL: dark since $(cat "$dir/state")"
 cp "$dir/full.set/ambient.dng" "$dir/kill.set/ambient.dng" # the size that check_files compares with
 check_files "$dir/kill.set" capturing 2
@@ -93,7 +92,7 @@ await_rig
 start_s=$SECONDS
 wait $pid
 [ $? = 1 ] || fail "vanished scanner: the exit status is not 1"
-[ $((SECONDS - start_s)) -le 15 ] || fail "vanished scanner: noticed after $((SECONDS - start_s)) s"
+[ $((SECONDS - start_s)) -le 60 ] || fail "vanished scanner: noticed after $((SECONDS - start_s)) s"
 [ "$(wc -l <"$dir/err")" = 1 ] || fail "vanished scanner: says $(cat "$dir/err")"
 check_files "$dir/gone.set" capturing 2
 expect 1 "the virtual scanner has ended" "${capture[@]}" "$dir/gone.set" --resume

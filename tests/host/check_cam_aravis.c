@@ -384,11 +384,11 @@ static void test_a_wait_can_be_cancelled(void **state)
     fake_camera_start(&fake, "BayerRG16", "64x64");
     assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
     expose_whole(camera, &frame);
-    fake_camera_tell(&fake, "delay 600");
+    fake_camera_tell(&fake, "delay 4000");
     weft_camera_set_idle(camera, cancel, NULL);
     const double start_s = weft_clock_s();
     assert_fails(weft_camera_expose(camera, 5, &frame, err), WEFT_ERR_CANCELLED, "enough");
-    assert_true(weft_clock_s() - start_s < 0.5);
+    assert_true(weft_clock_s() - start_s < 3);
     weft_camera_set_idle(camera, NULL, NULL);
     weft_mosaic_fini(&frame.mosaic);
     weft_camera_close(camera);
@@ -409,7 +409,7 @@ static void test_a_camera_that_dies_is_an_error_in_time(void **state)
     assert_int_not_equal(weft_camera_expose(camera, 4, &frame, &error), WEFT_OK);
     assert_non_null(strstr(error.text, "camera 127.0.0.1"));
     assert_non_null(strstr(error.text, "cable"));
-    assert_true(weft_clock_s() - start_s < 4.6);
+    assert_true(weft_clock_s() - start_s < 15);
     weft_mosaic_fini(&frame.mosaic);
     weft_camera_close(camera);
 }

@@ -77,7 +77,7 @@ static void test_a_second_program_is_refused_a_killed_one_outlived(void **state)
     waitpid(client, NULL, 0);
     const double start_s = weft_clock_s();
     assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
-    assert_true(weft_clock_s() - start_s < 8);
+    assert_true(weft_clock_s() - start_s < 30);
     assert_ok(weft_camera_expose(camera, 2, &frame, err));
     assert_int_equal(frame.status, WEFT_FRAME_COMPLETE);
     assert_int_equal(frame.mosaic.data[1], fake_camera_sample(1, 0, 20000, 0));

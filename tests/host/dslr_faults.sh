@@ -7,7 +7,7 @@ set -u
 # shellcheck source=tests/support/rig.sh
 . "$WEFT_TEST_SOURCE/tests/support/rig.sh"
 export HOME=$dir
-export WEFT_CAMERA_PATIENCE=1
+export WEFT_CAMERA_PATIENCE=$patience
 capture=("$weft" capture --rig "$dir/rig" --camera gphoto -q)
 
 # begin NAME FAULT: takes a set and orders the fault when its first frame is there.  Its exit status is in $status,

@@ -99,7 +99,7 @@ for try in 1 2 3; do # until the cable is pulled while the lamp is on
         kill -0 $run 2>/dev/null || fail "light run: $(cat run.err)"
     done
     tell "board unplug"
-    for _ in $(seq 50); do
+    for _ in $(seq 1000); do
         tell state
         jq -e '.lights_on == []' tell.out >lit.out && break
         sleep 0.02
