@@ -124,6 +124,6 @@ const weft_command weft_cmd_rig = {
         "Prints one JSON line when it is ready (also DIR/rig.json) and runs until Ctrl-C, SIGTERM or\n"
         "--tell quit.  Hardware commands use it with --rig DIR.  Commands for --tell: sample NAME,\n"
         "samples, state, truth DIR [MM_PER_PX], reset, quit.  docs/virtual-scanner.md says what it models.",
-    .example = "weft rig --dir r --sample twill &  weft capture twill.set --rig r",
+    .example = "weft rig --dir r --sample twill &  # when it is ready: weft capture twill.set --rig r",
     .run = run,
 };

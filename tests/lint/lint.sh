@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Formatting, headers that compile alone, layers, forbidden calls, static analysis.
+# Formatting, headers that compile alone, layers, forbidden calls, links of the documents, static analysis.
 # Run by ./dev lint after a build (it needs build/compile_commands.json).
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit 1
@@ -103,6 +103,7 @@ check "each header compiles alone" headers_alone
 check "no forbidden calls" forbidden_calls
 check "no left-over marks" words
 check "weft links no OpenCV, simavr or camera library" no_opencv_in_weft
+check "links and pictures of the documents" python3 tests/lint/doc_links.py
 check "shell scripts (shellcheck)" scripts
 check "static analysis (clang-tidy)" tidy
 ten_longest
