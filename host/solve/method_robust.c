@@ -5,6 +5,8 @@
  * Truncated least squares: the normal is the one with the least sum of min(r^2 / sigma^2, 9) over the lights.
  * (Torr and Zisserman, "MLESAC", CVIU 78, 2000, call it MSAC; every triple is tried, so nothing is random.)
  * It needs no number of lights to keep: on a steep flank three or four of ten are lit, on a matte crown all.
+ *
+ * The least squares of whatever is kept weights each sample by its noise (weft_lane_weigh()).
  */
 #include "host/solve/cloth_lobe.h"
 #include "host/solve/normal_equations.h"
@@ -12,9 +14,12 @@
 
 /* ---- least squares with weights, and the answers ---- */
 
-WEFT_INLINE void solve_weighted(const weft_solve_samples *s, const weft_lane_weights *weights,
+/* What the weights say is used, each sample by its noise.
+ * @param misfit  what the surface may miss Lambert's law by, of the brightest */
+WEFT_INLINE void solve_weighted(const weft_solve_samples *s, float misfit, weft_lane_weights *weights,
                                 weft_lane_sums *t, weft_lane_normals *scaled, weft_solve_answers *a)
 {
+    weft_lane_weigh(s, misfit, weights);
     weft_sums_add_up(s, weights, t);
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
@@ -50,14 +55,13 @@ WEFT_INLINE void judge(const weft_solve_samples *s, const weft_lane_weights *wei
 }
 
 static WEFT_CLONES void judge_glossy(const weft_solve_samples *restrict matte,
-                                     const weft_lane_weights *restrict kept,
-                                     weft_solve_answers *restrict answers)
+                                     weft_lane_weights *restrict kept, weft_solve_answers *restrict answers)
 {
     float nothing[WEFT_LANES] = {0}, mark[WEFT_LANES], all[WEFT_LANES] = {0};
     weft_lane_sums t;
     weft_lane_normals scaled;
     weft_lane_misfits m;
-    solve_weighted(matte, kept, &t, &scaled, answers);
+    solve_weighted(matte, WEFT_SOLVE_USUAL_MISFIT, kept, &t, &scaled, answers);
     weft_lane_measure(matte, kept, &scaled, &m);
     for (int j = 0; j < matte->n_lights; j++)
         for (int k = 0; k < WEFT_LANES; k++)
@@ -88,7 +92,7 @@ static WEFT_CLONES void solve_matte(const weft_solve_samples *restrict samples,
     weft_lane_normals scaled;
     weft_lane_misfits m;
     weft_lane_leave_shadows(samples, weights, dropped);
-    solve_weighted(samples, weights, &t, &scaled, answers);
+    solve_weighted(samples, WEFT_SOLVE_USUAL_MISFIT, weights, &t, &scaled, answers);
     weft_lane_measure(samples, weights, &scaled, &m);
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
@@ -166,7 +170,7 @@ static WEFT_CLONES void search_robust(const weft_solve_samples *restrict samples
         answers->search[k] = 0;
     }
     keep_agreeing(samples, inverse, &best, lit, kept);
-    solve_weighted(samples, kept, &t, &scaled, answers);
+    solve_weighted(samples, WEFT_SOLVE_MISFIT, kept, &t, &scaled, answers);
     weft_lane_measure(samples, kept, &scaled, &m);
     judge(samples, kept, &t, &scaled, &m, dropped, mark, answers);
 }

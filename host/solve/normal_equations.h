@@ -15,14 +15,14 @@
 
 enum { WEFT_LANES = WEFT_SOLVE_LANES };
 
-/** Sums over the lights: A = L^T L, b = L^T I' of the grey, and how many samples were used. */
+/** Sums over the lights: A = L^T W L, b = L^T W I' of the grey, and how many samples were used. */
 typedef struct weft_lane_sums {
     float xx[WEFT_LANES], xy[WEFT_LANES], xz[WEFT_LANES], yy[WEFT_LANES], yz[WEFT_LANES], zz[WEFT_LANES];
     float bx[WEFT_LANES], by[WEFT_LANES], bz[WEFT_LANES];
     float n[WEFT_LANES];
 } weft_lane_sums;
 
-/** The weight of light j: of `weights`, or of the samples when that is NULL. */
+/** The weights of light j: of `weights`, or of the samples, 1 or 0, when that is NULL. */
 WEFT_INLINE const float *weft_weights_of(const weft_solve_samples *s, const weft_lane_weights *weights, int j)
 {
     return weights ? weights[j].at : s->at[j].weight;
@@ -37,11 +37,11 @@ WEFT_INLINE void weft_sums_add_up(const weft_solve_samples *s, const weft_lane_w
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
             const float w = weight[k], grey = s->at[j].grey[k];
-            const float x = w * s->at[j].light[0][k], y = w * s->at[j].light[1][k],
-                        z = w * s->at[j].light[2][k];
-            t.n[k] += w;
-            t.xx[k] += x * x, t.xy[k] += x * y, t.xz[k] += x * z;
-            t.yy[k] += y * y, t.yz[k] += y * z, t.zz[k] += z * z;
+            const float lx = s->at[j].light[0][k], ly = s->at[j].light[1][k], lz = s->at[j].light[2][k];
+            const float x = w * lx, y = w * ly, z = w * lz;
+            t.n[k] += w > 0 ? 1.0F : 0.0F;
+            t.xx[k] += x * lx, t.xy[k] += x * ly, t.xz[k] += x * lz;
+            t.yy[k] += y * ly, t.yz[k] += y * lz, t.zz[k] += z * lz;
             t.bx[k] += grey * x, t.by[k] += grey * y, t.bz[k] += grey * z;
         }
     }
@@ -184,11 +184,12 @@ WEFT_INLINE void weft_lane_albedos(const weft_solve_samples *s, const weft_lane_
         weft_lane_albedo(s, weights, c, scaled, a);
 }
 
-/** How well the samples of the weights fit. */
+/** How well the samples fit that have a weight. */
 typedef struct weft_lane_misfits {
-    float squares[WEFT_LANES];   /* sum (I' - fit)^2 */
+    float squares[WEFT_LANES];   /* sum w (I' - fit)^2 */
     float brightest[WEFT_LANES]; /* largest fit */
-    float variance[WEFT_LANES];  /* sum of the camera's variances */
+    float variance[WEFT_LANES];  /* sum w^2 (the camera's variance): over n that of a row, as the answer feels
+                                    it */
 } weft_lane_misfits;
 
 WEFT_INLINE void weft_lane_measure(const weft_solve_samples *s, const weft_lane_weights *weights,
@@ -201,10 +202,10 @@ WEFT_INLINE void weft_lane_measure(const weft_solve_samples *s, const weft_lane_
         for (int k = 0; k < WEFT_LANES; k++) {
             const float fit = scaled->x[k] * s->at[j].light[0][k] + scaled->y[k] * s->at[j].light[1][k] +
                               scaled->z[k] * s->at[j].light[2][k];
-            const float d = weight[k] * (s->at[j].grey[k] - fit), used = weight[k] * fit;
-            m.squares[k] += d * d;
+            const float d = s->at[j].grey[k] - fit, used = weight[k] > 0 ? fit : 0.0F;
+            m.squares[k] += weight[k] * d * d;
             m.brightest[k] = used > m.brightest[k] ? used : m.brightest[k];
-            m.variance[k] += weight[k] * s->at[j].variance[k];
+            m.variance[k] += weight[k] * weight[k] * s->at[j].variance[k];
         }
     }
     *to = m;
@@ -307,6 +308,47 @@ WEFT_INLINE void weft_lane_leave_shadows(const weft_solve_samples *s, weft_lane_
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
         dropped[k] = lit[k] > 3.5F ? all[k] - lit[k] : 0.0F;
+}
+
+/**
+ * Gives what is used the weight of its noise, 1 / (variance + (misfit of the brightest used)^2): the lamps
+ * are not equally bright, and a surface not equally steep to them, so one sample is worth more than another.
+ * What cloth misses Lambert's law by counts as noise too, or a few samples would count for all.
+ *
+ * The weights of a pixel have the mean 1, and a weighted row has the same variance whatever the light, so
+ * that what is said of the matrix and the residuals of plain least squares holds.
+ *
+ * @param misfit   of the brightest used sample
+ * @param weights  [n_lights]  in: 1 or 0
+ */
+WEFT_INLINE void weft_lane_weigh(const weft_solve_samples *s, float misfit, weft_lane_weights *weights)
+{
+    float peak[WEFT_LANES], sum[WEFT_LANES] = {0}, n[WEFT_LANES] = {0};
+    for (int k = 0; k < WEFT_LANES; k++)
+        peak[k] = 0;
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < WEFT_LANES; k++) {
+            const float grey = weights[j].at[k] * s->at[j].grey[k];
+            peak[k] = grey > peak[k] ? grey : peak[k];
+        }
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < WEFT_LANES; k++) {
+            const float used = weights[j].at[k], tolerance = misfit * peak[k];
+            const float variance = s->at[j].variance[k] + tolerance * tolerance;
+            const float w = variance > 0 ? used / variance : used;
+            weights[j].at[k] = w;
+            sum[k] += w;
+            n[k] += used;
+        }
+#pragma omp simd
+    for (int k = 0; k < WEFT_LANES; k++)
+        sum[k] = n[k] > 0 ? n[k] / sum[k] : 1.0F;
+    for (int j = 0; j < s->n_lights; j++)
+#pragma omp simd
+        for (int k = 0; k < WEFT_LANES; k++)
+            weights[j].at[k] *= sum[k];
 }
 
 #endif

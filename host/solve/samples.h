@@ -21,7 +21,7 @@ typedef struct weft_solve_light {
     float variance[WEFT_SOLVE_LANES]; /* of grey by the camera's noise; 0 where that is not known */
 } weft_solve_light;
 
-/** Weights of one light's samples, 1 or 0; an array of them has an element a light. */
+/** Weights of one light's samples, 0: not used; an array of them has an element a light. */
 typedef struct weft_lane_weights {
     float at[WEFT_SOLVE_LANES];
 } weft_lane_weights;
@@ -99,5 +99,7 @@ extern const weft_solve_method weft_method_lsq, weft_method_robust, weft_method_
 #define WEFT_SOLVE_SHADOW 0.1f
 /** What a matte surface may differ from Lambert's law before it counts, relative to the brightest sample. */
 #define WEFT_SOLVE_MISFIT 0.02f
+/** What a matte surface usually differs from it by, beside the noise. */
+#define WEFT_SOLVE_USUAL_MISFIT 0.01f
 
 #endif

@@ -21,6 +21,7 @@ mm=$(python3 -c "print(0.125 * 1232 / int('$size'.split('x')[0]))")
 calibrate() { # in the scanner's folder
     "$weft" calibrate lens board-?.set -o s.cal --square-mm 10 --board-on-table board-table.set -q
     "$weft" calibrate lights white.set -o s.cal -q
+    "$weft" calibrate linearity munsell.set -o s.cal -q
     "$weft" calibrate white munsell.set -o s.cal -q
     "$weft" calibrate colour macbeth.set -o s.cal -q
 }
