@@ -5,9 +5,11 @@
 #include "host/cli/preview_match.h"
 #include "host/cli/preview_options.h"
 #include "host/cli/preview_sequence.h"
+#include "host/cli/preview_watch.h"
 
 #include "core/file.h"
 #include "core/formats/image_file.h"
+#include "core/log.h"
 #include "core/progress.h"
 
 #include <math.h>
@@ -149,15 +151,12 @@ static weft_err look_at_grid(const weft_invocation *inv, const weft_preview_opti
     return status;
 }
 
-static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
+/* All that is asked for, once. */
+static weft_err draw(const weft_invocation *inv, const weft_preview_options *a, weft_error *err)
 {
-    const weft_preview_options *const a = args;
     weft_preview_view view = weft_preview_view_defaults();
     weft_preview_around around = {0};
     double seconds = 0;
-    WEFT_TRY(weft_preview_options_check(a, inv->n_operands > 0, err));
-    if (!weft_preview_is_sequence(a))
-        WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
     WEFT_TRY(weft_preview_options_view(a, &view, err));
     if (a->env || a->sky.n) {
         weft_sky_filter filter = {.ambient_saturation = a->ambient_saturation};
@@ -174,6 +173,33 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
     return a->match || weft_preview_is_sequence(a)
                ? WEFT_OK
                : report(inv, a, (weft_size){view.width, view.height}, seconds, err);
+}
+
+/* Draws again at every change.  What cannot be drawn then is half-written or wrong for now: the picture
+ * stays. */
+static weft_err watch(const weft_invocation *inv, const weft_preview_options *a, weft_error *err)
+{
+    const char *const input = inv->n_operands ? inv->operands[0] : NULL;
+    uint64_t state = weft_preview_watch_state(input, a); /* before: a change while drawing counts */
+    WEFT_TRY(draw(inv, a, err));
+    for (;;) {
+        weft_error problem = {0};
+        fflush(inv->out);
+        WEFT_TRY(weft_preview_watch_wait(input, a, &state, err));
+        if (draw(inv, a, &problem) != WEFT_OK && !weft_cancelled())
+            weft_warn("%s; the picture stays as it was", problem.text);
+    }
+}
+
+static weft_err run(const weft_invocation *inv, const void *args, weft_error *err)
+{
+    const weft_preview_options *const a = args;
+    WEFT_TRY(weft_preview_options_check(a, inv->n_operands > 0, err));
+    if (a->watch && inv->json)
+        return weft_fail(err, WEFT_ERR_USAGE, "--watch prints a line a picture; it has no --json");
+    if (!weft_preview_is_sequence(a))
+        WEFT_TRY(weft_file_refuse_existing(a->output, inv->force, err));
+    return a->watch ? watch(inv, a, err) : draw(inv, a, err);
 }
 
 const weft_command weft_cmd_preview = {

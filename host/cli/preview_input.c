@@ -23,10 +23,21 @@ static weft_err set_constant(weft_preview_surface *surface, const char *text, we
     return WEFT_OK;
 }
 
+static bool is_picture_name(const char *name)
+{
+    static const char *const endings[] = {".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"};
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; i++)
+        if (weft_path_has_suffix(name, endings[i]))
+            return true;
+    return false;
+}
+
 static weft_err set_param(weft_preview_input *input, const char *text, weft_error *err)
 {
     weft_preview_surface *const surface = &input->surface;
     const char *const equals = strchr(text, '=');
+    if (equals && is_picture_name(equals + 1) && !weft_file_exists(equals + 1))
+        return weft_fail(err, WEFT_ERR_MISSING, "%s: there is no such picture", text);
     if (!equals || !weft_file_exists(equals + 1))
         return set_constant(surface, text, err);
     char name[64];

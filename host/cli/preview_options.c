@@ -190,6 +190,11 @@ const weft_field weft_preview_fields[] = {
      .max = 120,
      .def = "0",
      .help = "field of view of the camera; 0 sees everything straight on"},
+    {.key = "watch",
+     .type = WEFT_FIELD_FLAG,
+     .offset = offsetof(weft_preview_options, watch),
+     .help =
+         "draw again whenever INPUT or a picture of --param, --env or --height-map changes, until Ctrl-C"},
     {.key = "draft",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(weft_preview_options, draft),
@@ -388,6 +393,10 @@ weft_err weft_preview_options_check(const weft_preview_options *a, bool input, w
         return weft_fail(err, WEFT_ERR_USAGE, "--temporal wants --sweep N or --turntable N");
     if (!weft_preview_is_sequence(a) && (a->resume || weft_path_has_suffix(a->output, ".webp")))
         return weft_fail(err, WEFT_ERR_USAGE, "--resume and a .webp want --sweep N or --turntable N");
+    if (a->watch && (a->match || weft_preview_is_sequence(a)))
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "--watch draws one picture again; it goes with neither --match, --sweep nor "
+                         "--turntable");
     if (!a->match != !a->cal)
         return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
     if (a->match && !input)

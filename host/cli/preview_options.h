@@ -12,7 +12,7 @@ typedef struct weft_preview_options {
     weft_numbers light, light_mm, crop, sky;
     int shape, area, sky_model, tone, sweep, turntable, quality, shadow_steps, shadow_blur, folds, voxels,
         accumulate, fog_steps;
-    bool draft, self_shadow, resume, temporal, fog_even;
+    bool draft, self_shadow, resume, temporal, fog_even, watch;
     const char *height_map;
     int filter, taps;
     weft_size size;

@@ -86,4 +86,5 @@ mkdir other && echo x >other/notes.txt
 expect 1 'is there already and is no material' "$weft" bake coat.radattr -o other
 rm twill.maps/*.exr
 expect 1 'coat.radattr:5:' "$weft" bake coat.radattr -o gone.material
-[ ! -e gone.material ] && [ ! -e bad.material ]
+[ ! -e gone.material ]
+[ ! -e bad.material ]

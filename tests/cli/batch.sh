@@ -73,7 +73,8 @@ if find maps -name '.weft-*' | grep .; then echo "FAILED: left behind"; exit 1; 
 before=$(wc -l <maps/batch/events.jsonl)
 expect 0 '0 solved' "${batch[@]}"
 [ "$(wc -l <maps/batch/events.jsonl)" -eq "$before" ]
-grep -q '<svg' maps/report.html && grep -q 'data:image/jpeg;base64' maps/report.html
+grep -q '<svg' maps/report.html
+grep -q 'data:image/jpeg;base64' maps/report.html
 if grep -E 'src="?http|href="?http|NaN' maps/report.html; then exit 1; fi
 
 # maps that are solved but not in place, as a kill between the two leaves them, are put there and not solved again

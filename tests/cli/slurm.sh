@@ -177,7 +177,8 @@ status=0
 wait $waiting || status=$?
 waiting=
 cat err3
-[ $status -eq 130 ] && grep -q 'go on; the same command waits for them again' err3
+[ $status -eq 130 ]
+grep -q 'go on; the same command waits for them again' err3
 expect 1 'of an earlier batch' "$weft" batch bad/a.set -c r/truth.cal -o third --slurm --solve method=lsq
 scontrol update NodeName=n1,n2 State=RESUME
 expect 0 '1 solved' "$weft" batch bad/a.set -c r/truth.cal -o third --slurm

@@ -75,6 +75,11 @@ words() {
     ! git grep -nE '\b(TODO|FIXME|HACK)\b' -- ':!tests/lint/lint.sh'
 }
 
+# What set -e passes over: a command behind "!", and all but the last of "A && B".
+checks_that_cannot_fail() {
+    ! git grep -nE '^ *! (cmp|grep|diff|test|\[) [^|&]*$|^ *(\[|cmp|grep|diff|test) .* && (\[|! |cmp|grep|diff|test) [^|]*$' -- 'tests/*.sh'
+}
+
 no_opencv_in_weft() {
     ! ldd build/bin/weft | grep -E 'opencv|simavr|aravis|gphoto|libcamera'
 }
@@ -102,6 +107,7 @@ check "file names are unique" unique_names
 check "each header compiles alone" headers_alone
 check "no forbidden calls" forbidden_calls
 check "no left-over marks" words
+check "every check of a script can fail it" checks_that_cannot_fail
 check "weft links no OpenCV, simavr or camera library" no_opencv_in_weft
 check "links and pictures of the documents" python3 tests/lint/doc_links.py
 check "shell scripts (shellcheck)" scripts

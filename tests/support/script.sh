@@ -17,3 +17,11 @@ expect() { # STATUS WORDS COMMAND...: exit status, and WORDS somewhere in what i
         exit 1
     fi
 }
+
+refuse() { # COMMAND...: that must fail ("! COMMAND" on a line of its own never ends a script, whatever comes of it)
+    if "$@" >out.refused 2>&1; then
+        echo "FAILED: this should not succeed: $*"
+        cat out.refused
+        exit 1
+    fi
+}
