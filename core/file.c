@@ -5,6 +5,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -64,20 +65,33 @@ bool weft_folder_exists(const char *path)
     return stat(path, &s) == 0 && S_ISDIR(s.st_mode);
 }
 
-weft_err weft_file_size(const char *path, uint64_t *bytes, weft_error *err)
+/* Opens a regular file for reading; a folder, pipe or device is an error, and does not hold us up. */
+static weft_err open_regular(const char *path, int *fd, uint64_t *bytes, weft_error *err)
 {
     struct stat s;
-    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC); /* a pipe must not hold us up */
-    if (fd < 0)
+    const int opened = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (opened < 0)
         return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be opened", path);
-    const int result = fstat(fd, &s);
-    close(fd);
-    if (result != 0)
-        return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be looked at", path);
-    if (!S_ISREG(s.st_mode))
-        return weft_fail(err, WEFT_ERR_IO, "%s: is a %s, not a file", path,
-                         S_ISDIR(s.st_mode) ? "folder" : "device or pipe");
+    weft_err status = WEFT_OK;
+    if (fstat(opened, &s) != 0)
+        status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be looked at", path);
+    else if (!S_ISREG(s.st_mode))
+        status = weft_fail(err, WEFT_ERR_IO, "%s: is a %s, not a file", path,
+                           S_ISDIR(s.st_mode) ? "folder" : "device or pipe");
+    if (status != WEFT_OK) {
+        close(opened);
+        return status;
+    }
+    *fd = opened;
     *bytes = (uint64_t)s.st_size;
+    return WEFT_OK;
+}
+
+weft_err weft_file_size(const char *path, uint64_t *bytes, weft_error *err)
+{
+    int fd;
+    WEFT_TRY(open_regular(path, &fd, bytes, err));
+    close(fd);
     return WEFT_OK;
 }
 
@@ -195,8 +209,10 @@ static void forget(weft_atomic *a)
 weft_err weft_atomic_file_begin(weft_atomic *a, const char *path, weft_error *err)
 {
     weft_atomic begun;
-    if (weft_folder_exists(path))
-        return weft_fail(err, WEFT_ERR_IO, "%s: is a folder; give the name of a file", path);
+    struct stat s;
+    if (stat(path, &s) == 0 && !S_ISREG(s.st_mode)) /* root would put a file in the place of /dev/null */
+        return weft_fail(err, WEFT_ERR_IO, "%s: is a %s; give the name of a file", path,
+                         S_ISDIR(s.st_mode) ? "folder" : "device or pipe");
     WEFT_TRY(make_names(&begun, path, err));
     const int fd = open(begun.temp_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0) {
@@ -243,30 +259,39 @@ static weft_err sync_path(const char *path, weft_error *err)
     return WEFT_OK;
 }
 
-/* rename(2) replaces a file but not a folder with something in it: the old folder steps aside first. */
+/* For file systems that cannot exchange two names: a moment without the old folder and without the new one.
+ */
+static weft_err step_aside(const weft_atomic *a, weft_error *err)
+{
+    char *const aside = weft_asprintf(err, "%s-old", a->temp_path);
+    if (!aside)
+        return WEFT_ERR_NOMEM;
+    weft_err status = WEFT_OK;
+    if (rename(a->final_path, aside) != 0)
+        status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be replaced", a->final_path);
+    else if (rename(a->temp_path, a->final_path) == 0)
+        (void)rename(aside, a->temp_path);
+    else {
+        status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put in place", a->final_path);
+        if (rename(aside, a->final_path) != 0)
+            status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put back; it is in %s", a->final_path,
+                                     aside);
+    }
+    weft_free(aside);
+    return status;
+}
+
+/* Puts the new in the old one's place.  rename(2) does it for a file, not for a folder with something in it:
+ * the two change places, and what was replaced has the temporary's name. */
 static weft_err rename_over(const weft_atomic *a, weft_error *err)
 {
     if (rename(a->temp_path, a->final_path) == 0)
         return WEFT_OK;
-    if ((errno == ENOTEMPTY || errno == EEXIST) && weft_folder_exists(a->final_path)) {
-        char *const aside = weft_asprintf(err, "%s-old", a->temp_path);
-        if (!aside)
-            return WEFT_ERR_NOMEM;
-        weft_err status = WEFT_OK;
-        if (rename(a->final_path, aside) != 0)
-            status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be replaced", a->final_path);
-        else if (rename(a->temp_path, a->final_path) != 0) {
-            status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put in place", a->final_path);
-            if (rename(aside, a->final_path) != 0)
-                status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put back; it is in %s",
-                                         a->final_path, aside);
-        } else {
-            status = weft_folder_remove(aside, err);
-        }
-        weft_free(aside);
-        return status;
-    }
-    return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put in place", a->final_path);
+    if ((errno != ENOTEMPTY && errno != EEXIST) || !weft_folder_exists(a->final_path))
+        return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be put in place", a->final_path);
+    if (renameat2(AT_FDCWD, a->temp_path, AT_FDCWD, a->final_path, RENAME_EXCHANGE) == 0)
+        return WEFT_OK;
+    return step_aside(a, err);
 }
 
 static void remove_temporary(const weft_atomic *a)
@@ -285,8 +310,7 @@ weft_err weft_atomic_commit(weft_atomic *a, weft_error *err)
         status = rename_over(a, err);
     if (status == WEFT_OK)
         status = sync_path(parent, err);
-    else
-        remove_temporary(a);
+    remove_temporary(a); /* what could not be put in place, or was replaced */
     weft_free(parent);
     forget(a);
     return status;
@@ -303,7 +327,7 @@ weft_err weft_file_write(const char *path, const void *bytes, size_t n, weft_err
 {
     weft_atomic a;
     WEFT_TRY(weft_atomic_file_begin(&a, path, err));
-    FILE *const file = fopen(a.temp_path, "wb");
+    FILE *const file = fopen(a.temp_path, "wbe");
     size_t written = 0;
     int closed = EOF;
     if (file) {
@@ -318,30 +342,45 @@ weft_err weft_file_write(const char *path, const void *bytes, size_t n, weft_err
     return weft_atomic_commit(&a, err);
 }
 
+/* Up to `n` bytes, fewer at the file's end; -1 with errno. */
+static ssize_t read_all(int fd, char *bytes, size_t n)
+{
+    size_t done = 0;
+    while (done < n) {
+        const ssize_t more = read(fd, bytes + done, n - done);
+        if (more < 0 && errno == EINTR)
+            continue;
+        if (more < 0)
+            return -1;
+        if (more == 0)
+            break;
+        done += (size_t)more;
+    }
+    return (ssize_t)done;
+}
+
 weft_err weft_file_read(const char *path, size_t limit, char **bytes, size_t *n, weft_error *err)
 {
-    struct stat s;
-    FILE *const file = fopen(path, "rb");
-    if (!file)
-        return weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be opened", path);
+    uint64_t size;
+    int fd;
+    WEFT_TRY(open_regular(path, &fd, &size, err));
     weft_err status = WEFT_OK;
     char *text = NULL;
-    if (fstat(fileno(file), &s) != 0 || S_ISDIR(s.st_mode))
-        status = weft_fail(err, WEFT_ERR_IO, "%s: is not a file", path);
-    else if ((uintmax_t)s.st_size > limit)
-        status = weft_fail(err, WEFT_ERR_FORMAT, "%s: %jd bytes is more than such a file can have (%zu)",
-                           path, (intmax_t)s.st_size, limit);
-    else if (!(text = weft_alloc((size_t)s.st_size + 1, 1, err)))
+    ssize_t got = 0;
+    if (size > limit)
+        status =
+            weft_fail(err, WEFT_ERR_FORMAT, "%s: %" PRIu64 " bytes is more than such a file can have (%zu)",
+                      path, size, limit);
+    else if (!(text = weft_alloc((size_t)size + 1, 1, err)))
         status = WEFT_ERR_NOMEM;
-    else {
-        *n = fread(text, 1, (size_t)s.st_size, file);
-        if (ferror(file))
-            status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be read to its end", path);
-    }
-    fclose(file);
-    if (status == WEFT_OK)
+    else if ((got = read_all(fd, text, (size_t)size)) < 0)
+        status = weft_fail_errno(err, WEFT_ERR_IO, "%s: cannot be read to its end", path);
+    close(fd);
+    if (status == WEFT_OK) {
         *bytes = text;
-    else
+        *n = (size_t)got;
+    } else {
         weft_free(text);
+    }
     return status;
 }

@@ -21,7 +21,8 @@ typedef struct weft_atomic {
 } weft_atomic;
 
 /** Begins the file `path`: creates an empty temporary file beside it.  An existing `path` is replaced at
- *  commit (the caller asks first).  @return WEFT_ERR_IO naming the path and what to do. */
+ *  commit (the caller asks first).  @return WEFT_ERR_IO naming the path and what to do, also when it is a
+ *  folder, device or pipe. */
 weft_err weft_atomic_file_begin(weft_atomic *a, const char *path, weft_error *err);
 
 /** Begins the folder `path`: creates an empty temporary folder beside it.
@@ -29,7 +30,9 @@ weft_err weft_atomic_file_begin(weft_atomic *a, const char *path, weft_error *er
  *  @return WEFT_ERR_EXISTS when it is there and `force` is false; WEFT_ERR_IO. */
 weft_err weft_atomic_folder_begin(weft_atomic *a, const char *path, bool force, weft_error *err);
 
-/** Makes it durable and gives it its final name.  On failure the temporary is removed. */
+/** Makes it durable and gives it its final name, in one step also where there is an older one (on a file
+ * system that can exchange two names; NFS has a moment without either).  On failure the temporary is removed.
+ */
 weft_err weft_atomic_commit(weft_atomic *a, weft_error *err);
 
 /** Removes the temporary, if any.  Harmless on `{0}` and after commit. */
@@ -38,7 +41,8 @@ void weft_atomic_abort(weft_atomic *a);
 /** Writes `n` bytes as the file `path`, whole or not at all. */
 weft_err weft_file_write(const char *path, const void *bytes, size_t n, weft_error *err);
 
-/** Reads a whole file of at most `limit` bytes; adds a NUL behind; free with weft_free(). */
+/** Reads a whole regular file of at most `limit` bytes; adds a NUL behind; free with weft_free().
+ *  @return WEFT_ERR_FORMAT when it is larger; WEFT_ERR_IO when it is absent, no file, or not readable */
 weft_err weft_file_read(const char *path, size_t limit, char **bytes, size_t *n, weft_error *err);
 
 /** Says before any work is done that `path` would be overwritten: WEFT_ERR_EXISTS with the remedy. */

@@ -14,6 +14,9 @@
 #include <dirent.h>
 #include <locale.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -216,6 +219,15 @@ static void test_atomic_files(void **state)
     assert_fails(weft_atomic_file_begin(&a, weft_test_path("no/such/file"), err), WEFT_ERR_IO,
                  "no/such/file");
     assert_fails(weft_file_write(folder, "x", 1, err), WEFT_ERR_IO, "is a folder");
+    const char *const pipe = weft_test_path("atomic/pipe"); /* as /dev/null, which root could replace */
+    assert_int_equal(mkfifo(pipe, 0666), 0);
+    assert_fails(weft_file_write(pipe, "x", 1, err), WEFT_ERR_IO, "is a device or pipe");
+    assert_fails(weft_file_read(pipe, 100, &text, &n, err), WEFT_ERR_IO, "is a device or pipe");
+    assert_fails(weft_file_read(folder, 100, &text, &n, err), WEFT_ERR_IO, "is a folder");
+    assert_ok(weft_file_write(path, "", 0, err));
+    assert_ok(weft_file_read(path, 0, &text, &n, err));
+    assert_true(n == 0 && text[0] == '\0');
+    weft_free(text);
 }
 
 static void test_atomic_folders_replace_only_when_forced(void **state)
@@ -233,6 +245,41 @@ static void test_atomic_folders_replace_only_when_forced(void **state)
     assert_true(weft_file_exists(weft_test_path("result.maps/new")));
     assert_false(weft_file_exists(weft_test_path("result.maps/old")));
     assert_fails(weft_atomic_folder_begin(&a, path, false, err), WEFT_ERR_EXISTS, "result.maps");
+}
+
+static atomic_bool replaced;
+
+/* Looks without pause whether `path` is there. */
+static void *look(void *path)
+{
+    bool absent = false;
+    while (!absent && !atomic_load(&replaced))
+        absent = access(path, F_OK) != 0;
+    return absent ? path : NULL;
+}
+
+static void test_a_folder_is_replaced_in_one_step(void **state)
+{
+    (void)state;
+    char path[1024];
+    void *absent;
+    pthread_t looking;
+    assert_ok(weft_folder_create(weft_test_path("once"), err));
+    snprintf(path, sizeof path, "%s", weft_test_path("once/always"));
+    for (int round = 0; round < 30; round++) {
+        weft_atomic a;
+        assert_ok(weft_atomic_folder_begin(&a, path, true, err));
+        char *const inside = weft_path_join(a.temp_path, "x", NULL);
+        assert_ok(weft_file_write(inside, "x", 1, err));
+        weft_free(inside);
+        assert_ok(weft_atomic_commit(&a, err));
+        if (round == 0)
+            assert_int_equal(pthread_create(&looking, NULL, look, path), 0);
+    }
+    atomic_store(&replaced, true);
+    assert_int_equal(pthread_join(looking, &absent), 0);
+    assert_null(absent);
+    assert_int_equal(count_entries(weft_test_path("once")), 1); /* and nothing that was replaced */
 }
 
 static void test_json_names_file_and_key(void **state)
@@ -362,6 +409,7 @@ int main(void)
         cmocka_unit_test(test_options_refuse),
         cmocka_unit_test(test_atomic_files),
         cmocka_unit_test(test_atomic_folders_replace_only_when_forced),
+        cmocka_unit_test(test_a_folder_is_replaced_in_one_step),
         cmocka_unit_test(test_json_names_file_and_key),
         cmocka_unit_test(test_sha256_known_answers),
         cmocka_unit_test(test_parallel_rows_do_each_row_once),
