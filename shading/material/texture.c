@@ -24,7 +24,7 @@ const char *weft_place_text(weft_place place)
 
 weft_err weft_texture_path(const weft_rad_value *name, char **path, weft_error *err)
 {
-    static const char *const endings[] = {"", ".exr", ".png", ".tif", ".tiff", ".jpg"};
+    static const char *const endings[] = {"", ".exr", ".png", ".tif", ".tiff", ".jpg", ".jpeg"};
     char *const folder = weft_path_folder(name->place.source->path, err);
     char *const stem =
         folder ? weft_path_join(strcmp(folder, ".") == 0 ? NULL : folder, name->text, err) : NULL;

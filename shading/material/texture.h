@@ -14,7 +14,7 @@ typedef enum weft_texture_use {
 
 /**
  * The path of a file that a property names: beside the text that names it; without an ending, .exr .png .tif
- * .tiff .jpg are tried in turn.  Free with weft_free().
+ * .tiff .jpg .jpeg are tried in turn.  Free with weft_free().
  * @return WEFT_ERR_MISSING with the place in the text and the path that was looked at
  */
 weft_err weft_texture_path(const weft_rad_value *name, char **path, weft_error *err);
