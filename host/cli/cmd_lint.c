@@ -2,7 +2,6 @@
 #include "host/cli/command.h"
 
 #include "core/file.h"
-#include "core/formats/image_file.h"
 #include "core/mem.h"
 #include "shading/export/map_lint.h"
 
@@ -10,49 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_MAPS = 64, LONGEST_NAME = 256 };
-
-typedef enum map_kind { MAP_NORMAL, MAP_ALBEDO, MAP_SPECULAR, MAP_SCALAR, MAP_OTHER } map_kind;
+enum { MAX_MAPS = 64 };
 
 typedef struct linter {
     const weft_invocation *inv;
     json_t *findings;
     const char *file;
     int wrong, notes, width, height;
-    weft_image albedo, specular; /* to be held against each other; empty until met */
-    char prefix[LONGEST_NAME];   /* of the albedo's name */
+    weft_map albedo, specular; /* to be held against each other; empty until met */
 } linter;
-
-/* What a picture is by its name, and what stands there before the word that says so, in lower case. */
-static map_kind kind_of(const char *path, char prefix[LONGEST_NAME])
-{
-    static const struct {
-        const char *word;
-        map_kind kind;
-    } words[] = {{"normal", MAP_NORMAL},     {"nrm", MAP_NORMAL},     {"nml", MAP_NORMAL},
-                 {"bump", MAP_NORMAL},       {"albedo", MAP_ALBEDO},  {"basecolor", MAP_ALBEDO},
-                 {"base_color", MAP_ALBEDO}, {"diffuse", MAP_ALBEDO}, {"specular", MAP_SPECULAR},
-                 {"_f0", MAP_SPECULAR},      {"rough", MAP_SCALAR},   {"gloss", MAP_SCALAR},
-                 {"occlusion", MAP_SCALAR},  {"height", MAP_SCALAR},  {"displacement", MAP_SCALAR},
-                 {"metal", MAP_SCALAR}};
-    char name[LONGEST_NAME];
-    const char *const from = weft_path_name(path);
-    size_t n = 0;
-    for (; from[n] && n + 1 < sizeof name; n++)
-        name[n] = from[n] >= 'A' && from[n] <= 'Z' ? (char)(from[n] + 32) : from[n];
-    name[n] = '\0';
-    memset(prefix, 0, LONGEST_NAME);
-    if (strstr(name, "normal_length"))
-        return MAP_SCALAR;
-    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
-        const char *const found = strstr(name, words[i].word);
-        if (found) {
-            memcpy(prefix, name, (size_t)(found - name));
-            return words[i].kind;
-        }
-    }
-    return MAP_OTHER;
-}
 
 static void note(void *context, weft_lint_level level, const char *check, const char *text)
 {
@@ -67,79 +32,87 @@ static void note(void *context, weft_lint_level level, const char *check, const 
         fprintf(l->inv->out, "%-5s  %-28s %-15s %s\n", names[level], weft_path_name(l->file), check, text);
 }
 
-/* The first albedo stays, and the first F0 that is named as it is; the image is then empty. */
-static void keep(linter *l, map_kind kind, const char *prefix, weft_image *image)
-{
-    weft_image *const kept = kind == MAP_ALBEDO ? &l->albedo : &l->specular;
-    if (kept->data || (kind == MAP_SPECULAR && !(l->albedo.data && strcmp(prefix, l->prefix) == 0)))
-        return;
-    if (kind == MAP_ALBEDO)
-        memcpy(l->prefix, prefix, sizeof l->prefix);
-    *kept = *image;
-    *image = (weft_image){0};
-}
-
-static void lint_kind(linter *l, map_kind kind, bool is_coded, weft_image *image)
-{
-    const weft_lint lint = {note, l};
-    switch (kind) {
-    case MAP_NORMAL:
-        if (image->planes != 3) {
-            note(l, WEFT_LINT_WRONG, "channels", "a normal map has three");
-            break;
-        }
-        for (size_t i = 0; is_coded && i < 3 * weft_image_plane_size(image); i++)
-            image->data[i] = 2 * image->data[i] - 1;
-        weft_lint_normal(&lint, image);
-        break;
-    case MAP_ALBEDO:
-        weft_lint_albedo(&lint, image);
-        break;
-    case MAP_SPECULAR:
-        weft_lint_specular(&lint, image);
-        break;
-    case MAP_SCALAR:
-        weft_lint_scalar(&lint, image);
-        break;
-    case MAP_OTHER:
-        break;
-    }
-}
-
 static void lint_size(linter *l, const weft_image *image)
 {
-    if (l->width && (image->width != l->width || image->height != l->height)) {
-        char text[128];
+    const weft_lint lint = {note, l};
+    char text[128];
+    if (!l->width) {
+        l->width = image->width;
+        l->height = image->height;
+        weft_lint_size(&lint, image->width, image->height);
+    } else if (image->width != l->width || image->height != l->height) {
         (void)snprintf(text, sizeof text, "%d x %d, but the first map of the set is %d x %d", image->width,
                        image->height, l->width, l->height);
         note(l, WEFT_LINT_WRONG, "same size", text);
     }
-    l->width = l->width ? l->width : image->width;
-    l->height = l->height ? l->height : image->height;
 }
 
+/* The first albedo stays, and the first F0 that is named as it is; they are then compared. */
+static void lint_pair(linter *l, weft_map *map)
+{
+    const weft_lint lint = {note, l};
+    weft_map *const kept = map->kind == WEFT_MAP_ALBEDO ? &l->albedo : &l->specular;
+    if (kept->n_levels > 0 || (map->kind == WEFT_MAP_SPECULAR &&
+                               !(l->albedo.n_levels && strcmp(map->prefix, l->albedo.prefix) == 0)))
+        return;
+    *kept = *map;
+    *map = (weft_map){0};
+    if (kept == &l->specular && kept->levels[0].width == l->albedo.levels[0].width &&
+        kept->levels[0].height == l->albedo.levels[0].height)
+        weft_lint_specular_pair(&lint, &l->albedo.levels[0], &kept->levels[0]);
+}
+
+static void lint_map(linter *l, weft_map *map)
+{
+    const weft_lint lint = {note, l};
+    const weft_image *const image = &map->levels[0];
+    lint_size(l, image);
+    weft_lint_picture(&lint, image);
+    switch (map->kind) {
+    case WEFT_MAP_NORMAL:
+        if (image->planes == 3)
+            weft_lint_normal(&lint, image);
+        else
+            note(l, WEFT_LINT_WRONG, "channels", "a normal map has three");
+        break;
+    case WEFT_MAP_ALBEDO:
+        weft_lint_albedo(&lint, image);
+        break;
+    case WEFT_MAP_SPECULAR:
+        weft_lint_specular(&lint, image);
+        break;
+    case WEFT_MAP_ROUGHNESS:
+    case WEFT_MAP_SCALAR:
+        weft_lint_scalar(&lint, map);
+        break;
+    case WEFT_MAP_OTHER:
+        break;
+    }
+    if (map->is_coded && weft_path_has_suffix(l->file, ".exr"))
+        note(l, WEFT_LINT_NOTE, "coding", "floats that hold 0..1 for -1..1: write vectors, or integers");
+    weft_lint_mips(&lint, map);
+    if (map->kind == WEFT_MAP_ALBEDO || map->kind == WEFT_MAP_SPECULAR)
+        lint_pair(l, map);
+}
+
+/* What cannot be read is a finding: the others are looked at all the same. */
 static weft_err lint_file(linter *l, const char *path, weft_error *err)
 {
-    static const weft_transfer transfers[] = {[MAP_ALBEDO] = WEFT_TRANSFER_SRGB,
-                                              [MAP_SPECULAR] = WEFT_TRANSFER_BY_BITS,
-                                              [MAP_OTHER] = WEFT_TRANSFER_LINEAR};
-    const weft_lint lint = {note, l};
-    char prefix[LONGEST_NAME];
-    const map_kind kind = kind_of(path, prefix);
-    weft_image image;
+    weft_map map;
+    weft_error why = {0};
     l->file = path;
-    WEFT_TRY(weft_image_read(path, transfers[kind], &image, err));
-    weft_lint_picture(&lint, &image);
-    lint_size(l, &image);
-    lint_kind(l, kind, !weft_path_has_suffix(path, ".exr"), &image);
-    if (kind == MAP_ALBEDO || kind == MAP_SPECULAR) {
-        const bool had = l->specular.data;
-        keep(l, kind, prefix, &image);
-        if (!had && l->specular.data && l->specular.width == l->albedo.width &&
-            l->specular.height == l->albedo.height)
-            weft_lint_specular_pair(&lint, &l->albedo, &l->specular);
+    const weft_err status = weft_map_read(path, &map, &why);
+    if (status == WEFT_ERR_NOMEM || status == WEFT_ERR_MISSING) {
+        if (err)
+            *err = why;
+        return status;
     }
-    weft_image_fini(&image);
+    if (status != WEFT_OK) {
+        note(l, WEFT_LINT_WRONG, "readable", why.text);
+        return WEFT_OK;
+    }
+    lint_map(l, &map);
+    weft_map_fini(&map);
     return WEFT_OK;
 }
 
@@ -192,8 +165,8 @@ static weft_err run(const weft_invocation *inv, const void *args, weft_error *er
     else if (status == WEFT_OK)
         fprintf(inv->out, "%d wrong, %d notes\n", l.wrong, l.notes);
     json_decref(l.findings);
-    weft_image_fini(&l.albedo);
-    weft_image_fini(&l.specular);
+    weft_map_fini(&l.albedo);
+    weft_map_fini(&l.specular);
     if (status == WEFT_OK && l.wrong > 0)
         return weft_fail(err, WEFT_ERR_RANGE, "%d checks failed", l.wrong);
     return status;
@@ -206,8 +179,7 @@ const weft_command weft_cmd_lint = {
     .min_operands = 1,
     .max_operands = MAX_MAPS,
     .details = "A folder of maps or single pictures; what each is, its name tells (normal, albedo, "
-               "basecolor, roughness, "
-               "height, ...).  Exits 1 when something is wrong.",
+               "basecolor, roughness, height, ao, ...).  Exits 1 when something is wrong.",
     .example = "weft lint downloaded-fabric/",
     .run = run,
 };

@@ -55,5 +55,17 @@ expect 0 '100.0 % of the texels have an albedo above 0.2' "$weft" lint Metal_alb
 expect 0 '0.0 % are above 0.2 in both' "$weft" lint coded_albedo.png coded_specular.png
 "$weft" lint Other_albedo.png metal_specular.png >out # of different sets
 refuse grep 'specular, albedo' out
+# our own folders, with mips and without; solved maps have holes where the sample ends
+expect 0 'mip chain' "$weft" lint w.material
+grep -q 'height.exr .*range' out
+expect 0 'has no normal' "$weft" lint weave.maps
+grep -q 'unit normals    0.0 %' out
+# one that cannot be read is said, the rest is looked at
+mkdir mixed
+cp w.material/png/normal.png mixed/Weave_Normal.png
+echo no >mixed/Weave_AO.jpg
+expect 1 'Weave_AO.jpg: is a damaged JPEG' "$weft" lint mixed
+grep -q 'Weave_Normal.png .*unit normals' out
+expect 1 'nothing.png: is not there' "$weft" lint nothing.png
 mkdir empty
 expect 1 'empty: holds no pictures' "$weft" lint empty
