@@ -42,30 +42,42 @@ static bool is_left_alone(const char *name)
     return strncmp(name, "out_", 4) == 0 || strcmp(name, "tag") == 0 || strcmp(name, "note") == 0;
 }
 
-static bool assign_direction(table *t, int column)
+/* Where a column's numbers go: the first of `n` places; NULL when its name is unknown. */
+static int *places_of(table *t, const char *name, int *n)
 {
+    *n = 1;
     for (int k = 0; k < N_DIRECTION_WORDS; k++)
-        if (strcmp(t->csv->names[column], direction_words[k]) == 0) {
-            t->direction[k] = column;
-            return true;
-        }
-    return false;
-}
-
-static bool assign_param(table *t, int column)
-{
+        if (strcmp(name, direction_words[k]) == 0)
+            return &t->direction[k];
     int plane;
-    const char *const name = t->csv->names[column];
     const weft_brdf_param *const param = weft_brdf_find_param(t->brdf, name, &plane);
     if (param) {
-        for (int c = 0; c < param->components; c++)
-            t->param[plane + c] = column;
-        return true;
+        *n = param->components;
+        return &t->param[plane];
     }
     plane = channel_plane(t->brdf, name);
-    if (plane >= 0)
-        t->param[plane] = column;
-    return plane >= 0;
+    return plane >= 0 ? &t->param[plane] : NULL;
+}
+
+static weft_err assign_column(table *t, int column, weft_error *err)
+{
+    const char *const name = t->csv->names[column];
+    int n;
+    if (is_left_alone(name))
+        return WEFT_OK;
+    int *const places = places_of(t, name, &n);
+    if (!places)
+        return weft_fail(err, WEFT_ERR_FORMAT,
+                         "%s: column %s is neither a direction (nl nv phi, or lx ly lz vx vy vz) nor a "
+                         "parameter of %s",
+                         t->path, name, t->brdf->name);
+    for (int c = 0; c < n; c++) {
+        if (places[c] >= 0)
+            return weft_fail(err, WEFT_ERR_FORMAT, "%s: columns %s and %s give the same thing; leave one out",
+                             t->path, t->csv->names[places[c]], name);
+        places[c] = column;
+    }
+    return WEFT_OK;
 }
 
 static weft_err assign_columns(table *t, weft_error *err)
@@ -79,12 +91,14 @@ static weft_err assign_columns(table *t, weft_error *err)
         for (int c = 0; c < p->components; c++)
             t->owner[plane++] = p;
     for (int column = 0; column < t->csv->columns; column++)
-        if (!is_left_alone(t->csv->names[column]) && !assign_direction(t, column) && !assign_param(t, column))
-            return weft_fail(err, WEFT_ERR_FORMAT,
-                             "%s: column %s is neither a direction (nl nv phi, or lx ly lz vx vy vz) nor a "
-                             "parameter of %s",
-                             t->path, t->csv->names[column], t->brdf->name);
-    const bool vectors = t->direction[LX] >= 0;
+        WEFT_TRY(assign_column(t, column, err));
+    bool vectors = false, angles = false;
+    for (int k = 0; k < N_DIRECTION_WORDS; k++)
+        *(k < NL ? &vectors : &angles) |= t->direction[k] >= 0;
+    if (vectors && angles)
+        return weft_fail(err, WEFT_ERR_FORMAT,
+                         "%s: directions are vectors (lx ly lz vx vy vz) or angles (nl nv phi), not both",
+                         t->path);
     for (int k = vectors ? LX : NL; k < (vectors ? NL : PHI); k++)
         if (t->direction[k] < 0)
             return weft_fail(err, WEFT_ERR_FORMAT, "%s: there is no column %s", t->path, direction_words[k]);

@@ -290,16 +290,17 @@ const weft_command weft_cmd_brdf = {
     .max_operands = 1,
     .args_size = sizeof(brdf_args),
     .fields = fields,
-    .details =
-        "The table of --eval names its columns in the first line: nl, nv (cosines of light and view) and "
-        "phi\n"
-        "(azimuth between them, rad), or lx ly lz vx vy vz (unit vectors, z is the normal), and parameters "
-        "by\n"
-        "name, a colour also as name_r, name_g, name_b.  Columns out_*, tag and note are passed through.  "
-        "The\n"
-        "value (1/sr, without the cosine) is appended with 17 digits.  NAME may also be that of a table of\n"
-        "reference values, such as ord_ggx_terms or cloth_albedo, or a file NAME.binary of measured\n"
-        "reflectance in the form of the MERL database, as --merl writes it.",
+    .details = "The table of --eval names its columns in the first line: nl, nv (cosines of light and view) "
+               "and phi\n"
+               "(azimuth between them, rad; 0 without it), or lx ly lz vx vy vz (unit vectors, z is the "
+               "normal), and\n"
+               "parameters by name, a colour also as name_r, name_g, name_b.  Columns out_*, tag and note "
+               "are passed\n"
+               "through.  The value (1/sr, without the cosine) is appended with 17 digits.  NAME may also be "
+               "that of a\n"
+               "table of reference values, such as ord_ggx_terms or cloth_albedo, or a file NAME.binary of "
+               "measured\n"
+               "reflectance in the form of the MERL database, as --merl writes it.",
     .example = "weft brdf ggx --eval angles.csv --param alpha=0.3 --param f0=0.04",
     .run = run,
 };

@@ -42,8 +42,11 @@ static weft_err set_param(weft_preview_input *input, const char *text, weft_erro
         return set_constant(surface, text, err);
     char name[64];
     snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
+    const weft_brdf_param *const param = weft_brdf_find_param(surface->brdf, name, NULL);
     weft_image *const image = &input->extra[input->n_extra];
-    WEFT_TRY(weft_image_read(equals + 1, WEFT_TRANSFER_LINEAR, image, err));
+    WEFT_TRY(weft_image_read(equals + 1,
+                             param && param->components == 3 ? WEFT_TRANSFER_BY_BITS : WEFT_TRANSFER_LINEAR,
+                             image, err));
     input->n_extra++;
     const weft_err status = weft_preview_set_map(surface, name, image, err);
     return status == WEFT_OK ? WEFT_OK : weft_prefix(err, status, "%s", equals + 1);
@@ -151,12 +154,33 @@ static weft_err load_material(weft_preview_input *input, const char *folder, con
     return use_level(input, 0, err);
 }
 
+/* The size of the first picture among the parameters; unchanged when there is none. */
+static weft_err picture_size(const weft_texts *params, int *width, int *height, weft_error *err)
+{
+    for (int i = 0; i < params->n; i++) {
+        const char *const equals = strchr(params->values[i], '=');
+        weft_image image;
+        if (!equals || !weft_file_exists(equals + 1))
+            continue;
+        WEFT_TRY(weft_image_read(equals + 1, WEFT_TRANSFER_LINEAR, &image, err));
+        *width = image.width;
+        *height = image.height;
+        weft_image_fini(&image);
+        break;
+    }
+    return WEFT_OK;
+}
+
 static weft_err make_even(weft_preview_input *input, const char *brdf, weft_error *err)
 {
-    enum { SIDE = 64 };
-    const double mm_per_px = 50 * WEFT_PI / SIDE, corner = 0.5 * (SIDE - 1) * mm_per_px;
-    input->surface = (weft_preview_surface){
-        .width = SIDE, .height = SIDE, .mm_per_px = mm_per_px, .origin_mm = {-corner, corner}};
+    int width = 64, height = 64;
+    WEFT_TRY(picture_size(&input->params, &width, &height, err));
+    const double mm_per_px = 50 * WEFT_PI / (width < height ? width : height);
+    input->surface =
+        (weft_preview_surface){.width = width,
+                               .height = height,
+                               .mm_per_px = mm_per_px,
+                               .origin_mm = {-0.5 * (width - 1) * mm_per_px, 0.5 * (height - 1) * mm_per_px}};
     WEFT_TRY(weft_brdf_open(brdf, &input->measured, &input->surface.brdf, err));
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     for (int i = 0; i < input->params.n; i++)

@@ -26,8 +26,10 @@ typedef struct weft_preview_input {
  * Loads solved maps (NAME.maps) or a baked material (NAME.material) for a model.
  *
  * @param brdf    name of a model, or NAME.binary: a table of the MERL form
- * @param folder  NULL: a smooth even surface of the model's parameters, a ball of which has a radius of 50 mm
- * @param params  "name=0.3", "name=r,g,b", or "name=FILE" (EXR, or PNG/TIFF as linear 0..1) of the same size
+ * @param folder  NULL: a smooth surface of the model's parameters, as large as the first picture among them
+ * (else 64 x 64), a ball of which has a radius of 50 mm
+ * @param params  "name=0.3", "name=r,g,b", or "name=FILE" of the same size; colours of 8 bits are sRGB, of 16
+ *                linear (docs/conventions.md)
  * The albedo map becomes the parameters "albedo", "base" and "cloth_albedo" as the model has them; a material
  * also gives "f0" (from specular), "alpha" (from roughness), "anisotropy", "front" and "rim".
  */

@@ -34,6 +34,9 @@ bad 'row 1: nl is 1.5' 'nl,nv' '1.5,1'
 bad 'row 1: lx ly lz is 2 long' 'lx,ly,lz,vx,vy,vz' '0,0,2,0,0,1'
 bad 'row 1: alpha of ggx is 2' 'nl,nv,alpha' '1,1,2'
 bad '"x" is not a number' 'nl,nv' 'x,1'
+bad 'columns nl and nl give the same thing' 'nl,nv,nl' '1,1,0.5'
+bad 'columns f0 and f0_g give the same thing' 'nl,nv,f0,f0_g' '1,1,0.5,0.5'
+bad 'vectors (lx ly lz vx vy vz) or angles' 'lx,ly,lz,vx,vy,vz,phi' '0,0,1,0,0,1,0'
 expect 2 'it has albedo, f0, alpha' "$weft" brdf ggx --eval "$work/t.csv" --param roughness=1
 expect 2 'wants the NAME' "$weft" brdf --eval "$work/t.csv"
 expect 1 'absent.csv' "$weft" brdf ggx --eval "$work/absent.csv"

@@ -171,6 +171,12 @@ expect 2 'neither --match' "$weft" preview -o x.png --watch --sweep 3
 expect 2 'no --json' "$weft" preview -o x.png --watch --json
 expect 1 'alpha=rough.exr: there is no such picture' "$weft" preview -o x.png --brdf ggx --param alpha=rough.exr
 
+# without INPUT the first picture is the surface; its 8 bits are sRGB where they are a colour: 188 is 0.503
+python3 -c 'import pngfile
+pngfile.write("grey.png", 30, 20, 8, 3, [[188, 188, 188] * 30] * 20)'
+expect 0 'photo.png: 30 x 20' "$weft" preview -o photo.png --param albedo=grey.png --light 0,90 --ambient 0
+python3 -c 'import pngfile
+assert set(pngfile.read("photo.png")[4][10]) == {188}'
 # shadows of the relief and of folds
 expect 0 'lit.exr' "$weft" preview weave.maps -o lit.exr --light 20,15 --size 200x150
 expect 0 'dark.exr' "$weft" preview weave.maps -o dark.exr --light 20,15 --size 200x150 --self-shadow
