@@ -180,12 +180,13 @@ static weft_err convert_mosaic(const weft_mosaic *mosaic, double scale, weft_ima
 static weft_err read_picture(const weft_set *set, const char *path, weft_image *image, double *black,
                              double *white, weft_error *err)
 {
-    const bool exr = weft_path_has_suffix(path, ".exr");
+    const bool exr = weft_path_has_suffix(path, ".exr"), png = weft_path_has_suffix(path, ".png");
     *black = 0;
     *white = exr ? INFINITY : 1;
-    if (exr || !(weft_path_has_suffix(path, ".png") || weft_path_has_suffix(path, ".tif") ||
-                 weft_path_has_suffix(path, ".tiff"))) {
-        WEFT_TRY(weft_image_read(path, WEFT_TRANSFER_LINEAR, image, err)); /* names what it does not read */
+    if (!exr && !png && !weft_path_has_suffix(path, ".tif") && !weft_path_has_suffix(path, ".tiff"))
+        return weft_fail(err, WEFT_ERR_FORMAT, WEFT_FRAME_NOT_READ, path);
+    if (exr) {
+        WEFT_TRY(weft_image_read(path, WEFT_TRANSFER_LINEAR, image, err));
         if (set->white > 0) {
             *black = set->black[0];
             *white = set->white;
@@ -193,8 +194,7 @@ static weft_err read_picture(const weft_set *set, const char *path, weft_image *
         return WEFT_OK;
     }
     weft_raster raster;
-    WEFT_TRY(weft_path_has_suffix(path, ".png") ? weft_png_read(path, &raster, err)
-                                                : weft_tiff_read(path, &raster, err));
+    WEFT_TRY(png ? weft_png_read(path, &raster, err) : weft_tiff_read(path, &raster, err));
     const weft_transfer transfer = raster.bits == 8 ? set->transfer : WEFT_TRANSFER_LINEAR;
     if (set->white > 0 && transfer == WEFT_TRANSFER_LINEAR) {
         const double top = (1 << raster.bits) - 1;

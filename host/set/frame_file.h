@@ -4,6 +4,10 @@
 
 #include "host/set/set.h"
 
+/** Of a file (%s) that is no frame by its name. */
+#define WEFT_FRAME_NOT_READ                                                                                  \
+    "%s: is no camera raw, PNG, TIFF or EXR by its name (a JPEG is too coarse for normals)"
+
 /**
  * Reads a frame as (DN - black) / (white - black) * scale.
  *

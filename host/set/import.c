@@ -8,6 +8,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/sha256.h"
+#include "host/set/frame_file.h"
 #include "host/set/import_list.h"
 #include "host/set/set.h"
 
@@ -86,6 +87,8 @@ static weft_err picture_size(const char *path, int *width, int *height, int *bit
         return WEFT_OK;
     }
     weft_image image;
+    if (!weft_path_has_suffix(path, ".exr"))
+        return weft_fail(err, WEFT_ERR_FORMAT, WEFT_FRAME_NOT_READ, path);
     WEFT_TRY(weft_image_read(path, WEFT_TRANSFER_LINEAR, &image, err));
     *width = image.width;
     *height = image.height;

@@ -2,6 +2,7 @@
 #include "tests/support/support.h"
 
 #include "core/file.h"
+#include "core/formats/jpeg_bytes.h"
 #include "core/formats/png_file.h"
 #include "core/mem.h"
 #include "host/set/compare.h"
@@ -137,6 +138,21 @@ static void test_lp_that_is_wrong(void **state)
                  WEFT_ERR_NODATA, "too few");
     assert_false(weft_file_exists(weft_test_path("bad.set")));
     assert_false(weft_file_exists(weft_test_path("bad.cal")));
+}
+
+/* A JPEG is read as a texture; as a measurement it would be taken for linear light. */
+static void test_jpegs_are_refused(void **state)
+{
+    (void)state;
+    uint8_t grey[16 * 16 * 3];
+    unsigned char *bytes;
+    size_t n;
+    memset(grey, 128, sizeof grey);
+    assert_ok(weft_jpeg_encode(grey, 16, 16, 95, &bytes, &n, err));
+    assert_ok(weft_file_write(weft_test_path("rti/a.jpg"), bytes, n, err));
+    weft_jpeg_free(bytes);
+    assert_fails(import_lp("3\na.jpg 0 0 1\na.jpg 0.5 0 0.866\na.jpg 0 0.5 0.866\n", "bad.set", NULL, err),
+                 WEFT_ERR_FORMAT, "a.jpg: is no camera raw, PNG, TIFF or EXR");
 }
 
 static void test_existing_outputs_are_kept(void **state)
@@ -326,6 +342,7 @@ int main(void)
         cmocka_unit_test(test_plain_lp),
         cmocka_unit_test(test_lp_of_the_wild),
         cmocka_unit_test(test_lp_that_is_wrong),
+        cmocka_unit_test(test_jpegs_are_refused),
         cmocka_unit_test(test_existing_outputs_are_kept),
         cmocka_unit_test(test_directions_folder),
         cmocka_unit_test(test_transfer_is_found_out),
