@@ -14,7 +14,8 @@
 #include <math.h>
 #include <string.h>
 
-#define BLUR_MOST 0.2 /* width of an edge over a square's */
+#define BLUR_MOST        0.2 /* width of an edge over a square's */
+#define LEANING_MOST_DEG 15  /* of a camera over a table; the boards of a lens lean by 20 and more */
 
 typedef struct lens_args {
     const char *output, *on_table;
@@ -188,8 +189,20 @@ static void warn_of_weak_views(const lens_run *run)
                   100 * run->lens.coverage);
 }
 
+/* Degrees between the camera's view and straight down on the table. */
+static double leaning_deg(const weft_camera *camera)
+{
+    return acos(fmin(fmax(-camera->rotation.m[8], -1), 1)) * 57.29577951308232;
+}
+
 static weft_err fit_lens(lens_run *run, weft_error *err)
 {
+    if (run->n_views == 0)
+        return weft_fail(
+            err, WEFT_ERR_NODATA,
+            "none of the %zu pictures shows a board of %dx%d inner corners: count those where four "
+            "squares meet, and give their number with --board",
+            json_array_size(run->without_board), run->board.columns, run->board.rows);
     const bool had_lights = run->cal.has_lights, had_pose = run->cal.has_camera && run->cal.camera.has_pose;
     WEFT_TRY(weft_lens_fit(&run->board, run->width, run->height, run->views, run->n_views, &run->options,
                            &run->cal.camera, &run->lens, err));
@@ -216,8 +229,13 @@ static weft_err fit_pose(lens_run *run, weft_error *err)
                          "and flat on the table",
                          path, run->board.columns, run->board.rows);
     WEFT_TRY(weft_calibration_require_size(&run->cal, run->width, run->height, run->args->output, err));
-    return weft_lens_fit_pose(&run->board, &view, run->args->origin_mm.values, &run->cal.camera,
-                              &run->pose_rms_px, err);
+    WEFT_TRY(weft_lens_fit_pose(&run->board, &view, run->args->origin_mm.values, &run->cal.camera,
+                                &run->pose_rms_px, err));
+    if (leaning_deg(&run->cal.camera) > LEANING_MOST_DEG)
+        weft_warn(
+            "%s: the camera looks %.0f degrees past straight down: did this board lie flat on the table?",
+            path, leaning_deg(&run->cal.camera));
+    return WEFT_OK;
 }
 
 static json_t *board_json(const weft_board *board)
@@ -304,9 +322,9 @@ static json_t *lens_json(const lens_run *run)
 
 static json_t *pose_json(const lens_run *run)
 {
-    return json_pack("{s:s, s:f, s:o, s:o}", "image", run->args->on_table, "rms_px", run->pose_rms_px,
-                     "board", board_json(&run->board), "board_origin_mm",
-                     weft_json_numbers(run->args->origin_mm.values, 2));
+    return json_pack("{s:s, s:f, s:f, s:o, s:o}", "image", run->args->on_table, "rms_px", run->pose_rms_px,
+                     "leaning_deg", leaning_deg(&run->cal.camera), "board", board_json(&run->board),
+                     "board_origin_mm", weft_json_numbers(run->args->origin_mm.values, 2));
 }
 
 static weft_err print_result(const weft_invocation *inv, const lens_run *run, weft_error *err)
@@ -335,8 +353,9 @@ static weft_err print_result(const weft_invocation *inv, const lens_run *run, we
                 s[7]);
     }
     if (run->args->on_table)
-        fprintf(inv->out, "pose: camera %.1f mm over the table, board met to %.3f px\n",
-                weft_camera_centre(c).z, run->pose_rms_px);
+        fprintf(inv->out,
+                "pose: camera %.1f mm over the table, leaning by %.1f degrees, board met to %.3f px\n",
+                weft_camera_centre(c).z, leaning_deg(c), run->pose_rms_px);
     return WEFT_OK;
 }
 

@@ -18,7 +18,8 @@ done
 
 expect 2 'pictures of the board are missing' "$weft" calibrate lens -o lens.cal
 expect 1 '4 views of the board; wanted 5' "$weft" calibrate lens left0[1-4].png -o lens.cal --square-mm 25
-expect 1 'no board of 12x9' "$weft" calibrate lens left0[1-5].png -o lens.cal --board 12x9
+expect 1 'none of the 5 pictures shows a board of 12x9' "$weft" calibrate lens left0[1-5].png -o lens.cal --board 12x9
+grep -q 'left03.png: no board of 12x9' out
 expect 2 '2x6' "$weft" calibrate lens left0[1-5].png -o lens.cal --board 2x6
 expect 1 'none.png' "$weft" calibrate lens left0[1-5].png none.png -o lens.cal
 head -c 5000 left01.png >cut.png
@@ -35,6 +36,8 @@ expect 2 '--bent' "$weft" calibrate lens left*.png -o other.cal --bent maybe
 expect 1 '--force' "$weft" calibrate lens left*.png -o lens.cal --square-mm 25
 expect 1 'has a pose already' "$weft" calibrate lens -o lens.cal --board-on-table left01.png
 expect 0 'pose: camera' "$weft" calibrate lens -o lens.cal --square-mm 25 --board-on-table left01.png --force
+cp -r lens.cal leaning.cal
+expect 0 'did this board lie flat on the table?' "$weft" calibrate lens -o leaning.cal --square-mm 25 --board-on-table left03.png --force
 python3 - <<'PY'
 import json
 r, c = json.load(open("report.json")), json.load(open("lens.cal/calibration.json"))
