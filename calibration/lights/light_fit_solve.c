@@ -460,13 +460,14 @@ static double middle_sigma(const fit_problem *f, const normal *q, int l)
     return sqrt(fmax(sum, 0) * q->step);
 }
 
-static void find_sigmas(fit_problem *f, normal *q)
+static weft_err find_sigmas(fit_problem *f, normal *q, weft_error *err)
 {
     const size_t n = (size_t)q->n;
     set_aims(f, q);
     build(f, q);
     if (!solve_step(q, 0) || LAPACKE_dpotri(LAPACK_ROW_MAJOR, 'L', q->n, q->factor, q->n) != 0)
-        memset(q->factor, 0, n * n * sizeof *q->factor);
+        return weft_fail(err, WEFT_ERR_NODATA,
+                         "the sheet leaves the lights open: the equations are singular");
     for (int l = 0; l < q->scope.n; l++) {
         const int light = q->scope.first + l;
         double *const sigma = f->sigma[light].p, sum = 0;
@@ -479,9 +480,10 @@ static void find_sigmas(fit_problem *f, normal *q)
         f->irradiance_sigma[light] = middle_sigma(f, q, l);
     }
     const size_t e0 = (size_t)q->scope.n * FIT_LAMP;
-    f->shared_sigma.e0 = sqrt(q->factor[e0 * (n + 1)]);
+    f->shared_sigma.e0 = sqrt(q->factor[e0 * (n + 1)] * q->step);
     for (size_t k = 0; k < FIT_SHAPE; k++)
         f->shared_sigma.shape[k] = sqrt(q->factor[(e0 + 1 + k) * (n + 1)] * q->step);
+    return WEFT_OK;
 }
 
 weft_err fit_solve(fit_problem *f, fit_scope scope, weft_error *err)
@@ -499,7 +501,7 @@ weft_err fit_solve(fit_problem *f, fit_scope scope, weft_error *err)
         update_common(f, &q);
     }
     if (status == WEFT_OK && scope.sigmas)
-        find_sigmas(f, &q);
+        status = find_sigmas(f, &q, err);
     normal_fini(&q);
     return status;
 }

@@ -7,7 +7,7 @@
 /** Its name in the folder of a calibration. */
 #define WEFT_WHITE_SHEET_FILE "white-sheet.exr"
 
-/** Writes `folder`/white-sheet.exr: half floats, the channels light00.R, light00.G, ...; cells left out are
+/** Writes `folder`/white-sheet.exr: floats, the channels light00.R, light00.G, ...; cells left out are
  * NaN. */
 weft_err weft_white_sheet_save(const char *folder, const weft_white_sheet *sheet, weft_error *err);
 

@@ -263,8 +263,8 @@ static void judge_age(const weft_calibration *cal, const char *step, const char 
     const char *const mine = weft_report_text(weft_calibration_get_report(cal, step), "created");
     const char *const theirs = weft_report_text(weft_calibration_get_report(cal, before), "created");
     if (mine[0] && theirs[0] && strcmp(mine, theirs) < 0)
-        add(v, WEFT_GRADE_REDO, step, command, "It is of %s, but the %s it stands on was made anew at %s.",
-            mine, before, theirs);
+        add(v, WEFT_GRADE_REDO, step, command, "It is of %s and stands on the %s, made anew at %s.", mine,
+            before, theirs);
 }
 
 void weft_report_judge(const weft_calibration *cal, weft_verdict *verdict)

@@ -51,10 +51,13 @@ static weft_err write_page(const char *path, const char *folder, const weft_cali
     char *const name = name_of(folder, err);
     if (!name)
         return WEFT_ERR_NOMEM;
-    const bool has_sheet =
-        cal->has_camera && cal->has_lights && weft_white_sheet_load(folder, cal, &sheet, &why) == WEFT_OK;
-    if (cal->has_lights && !has_sheet)
-        weft_explain("no maps of the sheet: %s", why.text);
+    weft_err loaded = WEFT_ERR_MISSING;
+    if (cal->has_camera && cal->has_lights)
+        loaded = weft_white_sheet_load(folder, cal, &sheet, &why);
+    const bool has_sheet = loaded == WEFT_OK;
+    if (loaded != WEFT_OK && loaded != WEFT_ERR_MISSING &&
+        loaded != WEFT_ERR_IO) /* a calibration may lack it */
+        weft_warn("the page has no maps of the sheet: %s", why.text);
     weft_report_page(cal, name, has_sheet ? &sheet : NULL, verdict, &page);
     weft_err status = weft_text_buffer_status(&page, err);
     if (status == WEFT_OK)

@@ -216,7 +216,7 @@ static void test_what_is_stale_is_named(void **state)
     json_t *const colour = json_object_get(json_object_get(cal.other, "reports"), "colour");
     json_object_set_new(colour, "created", json_string("2020-01-01T00:00:00Z"));
     weft_report_judge(&cal, &v);
-    assert_grade(&v, "colour", "lights it stands on", WEFT_GRADE_REDO);
+    assert_grade(&v, "colour", "stands on the lights", WEFT_GRADE_REDO);
     weft_calibration_fini(&cal);
 }
 

@@ -23,6 +23,18 @@ for l in c["lights"]:
     assert abs(l["white_balance"][0] - l["intensity"][1] / l["intensity"][0]) < 1e-9
 PY
 
+# a report does without the sheet, and says so when it is damaged
+expect 0 'good    lights' "$weft" calibrate report scanner.cal -o page.html
+no_maps() { grep -q 'the page has no maps of the sheet' out; }
+if no_maps; then cat out; exit 1; fi
+cp -r scanner.cal cut.cal
+truncate -s 1000 cut.cal/white-sheet.exr
+expect 0 'white-sheet.exr' "$weft" calibrate report cut.cal -o cut.html
+no_maps
+rm cut.cal/white-sheet.exr
+expect 0 'good    lights' "$weft" calibrate report cut.cal -o without.html
+if no_maps; then cat out; exit 1; fi
+
 # what is refused leaves the calibration as it was
 sha256sum scanner.cal/* >before
 expect 1 'weft calibrate lens' "$weft" calibrate lights white.set -o nowhere.cal
