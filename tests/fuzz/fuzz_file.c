@@ -4,14 +4,21 @@
  * or a read that never ends is a defect; an error is what damaged bytes are supposed to give.
  */
 #include "calibration/calibration.h"
+#include "core/csv.h"
+#include "core/file.h"
 #include "core/formats/exr_file.h"
+#include "core/formats/ihex_file.h"
+#include "core/formats/jpeg_bytes.h"
 #include "core/formats/png_file.h"
 #include "core/formats/raw_file.h"
 #include "core/formats/tiff_file.h"
 #include "core/log.h"
 #include "core/mem.h"
+#include "host/rig/scene.h"
 #include "host/set/import_list.h"
+#include "host/set/maps.h"
 #include "host/set/set.h"
+#include "shading/bake/material_file.h"
 #include "shading/brdf/merl.h"
 #include "shading/material/asset.h"
 #include "shading/u3m/u3m_document.h"
@@ -123,6 +130,83 @@ static void read_calibration(const char *path)
     weft_calibration cal;
     if (weft_calibration_load(folder_with("calibration.json", path), &cal, NULL) == WEFT_OK)
         weft_calibration_fini(&cal);
+}
+
+static void read_csv(const char *path)
+{
+    weft_csv csv;
+    double value;
+    if (weft_csv_read(path, &csv, NULL) != WEFT_OK)
+        return;
+    for (int row = 0; row < csv.rows; row++)
+        for (int column = 0; column < csv.columns; column++)
+            (void)weft_csv_number(&csv, row, column, path, &value, NULL);
+    weft_csv_fini(&csv);
+}
+
+/* The firmware that is flashed. */
+static void read_ihex(const char *path)
+{
+    uint8_t memory[32768];
+    uint32_t begin, end;
+    if (weft_ihex_read(path, memory, sizeof memory, &begin, &end, NULL) == WEFT_OK && end > sizeof memory)
+        abort();
+}
+
+static void read_jpeg(const char *path)
+{
+    char *bytes;
+    size_t n;
+    weft_raster raster;
+    if (weft_file_read(path, (size_t)1 << 24, &bytes, &n, NULL) != WEFT_OK)
+        return;
+    if (weft_jpeg_decode((const unsigned char *)bytes, n, &raster, NULL) == WEFT_OK)
+        weft_raster_fini(&raster);
+    weft_free(bytes);
+}
+
+/* The head of a folder of maps, whose picture is in order. */
+static void read_maps(const char *path)
+{
+    static const char *const names[] = {"X", "Y", "Z"};
+    char normal[64];
+    weft_maps maps;
+    const char *const folder = folder_with("maps.json", path);
+    snprintf(normal, sizeof normal, "%s/normal.exr", folder);
+    if (!weft_file_exists(normal)) {
+        weft_image image;
+        if (weft_image_init(&image, 3, 2, 3, NULL) != WEFT_OK ||
+            weft_exr_write(normal, &image, names, WEFT_EXR_HALF, NULL) != WEFT_OK)
+            abort();
+        weft_image_fini(&image);
+    }
+    if (weft_maps_load(folder, &maps, NULL) == WEFT_OK)
+        weft_maps_fini(&maps);
+}
+
+static void read_baked(const char *path)
+{
+    weft_baked baked = {0};
+    json_t *state = NULL;
+    if (weft_material_load_head(folder_with("material.json", path), &baked, &state, NULL) != WEFT_OK)
+        return;
+    json_decref(state);
+    weft_baked_fini(&baked);
+}
+
+static void read_directions(const char *path)
+{
+    weft_import_list list;
+    weft_log_set_level(WEFT_LOG_QUIET);
+    if (weft_import_read_directions(folder_with("light_directions.txt", path), &list, NULL) == WEFT_OK)
+        weft_import_list_fini(&list);
+}
+
+static void read_scene(const char *path)
+{
+    weft_rig_setup setup;
+    weft_rig_setup_init(&setup);
+    (void)weft_rig_setup_load(path, &setup, NULL);
 }
 
 static void read_lp(const char *path)

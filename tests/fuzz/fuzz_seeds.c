@@ -2,6 +2,7 @@
  */
 #include "core/file.h"
 #include "core/formats/exr_file.h"
+#include "core/formats/jpeg_bytes.h"
 #include "core/formats/png_file.h"
 #include "core/formats/tiff_file.h"
 #include "core/formats/zip_file.h"
@@ -91,10 +92,30 @@ static weft_err write_texts(const char *folder, weft_error *err)
     static const char cal[] =
         "{\"weft\":\"calibration\",\"version\":1,\"lights\":[{\"position_mm\":[0,0,300],\"axis\":[0,0,-1],"
         "\"exponent\":1,\"intensity\":[1,1,1]}]}";
+    static const char csv[] = "x,\"y \"\"z\"\r\n1,2e-3\n\"3\n\",nan\n";
+    static const char ihex[] = ":10010000214601360121470136007EFE09D2190140\n:020000021000EC\n:00000001FF\n";
+    static const char maps[] =
+        "{\"weft\":\"maps\",\"version\":1,\"geometry\":\"plane\",\"mm_per_px\":0.1,\"origin_mm\":[0,0],"
+        "\"albedo_colour\":\"linear sRGB\",\"width\":3,\"height\":2}";
+    static const char directions[] = "0 0 1\n0.6,0,0.8\n";
+    static const char scene[] = "{\"weft\":\"scene\",\"version\":1,\"seed\":2,\"noise\":false,\"room_light\":"
+                                "0.1,\"strip_mm\":[0,0,9,9],"
+                                "\"lights\":[{\"position_mm\":[0,0,300],\"axis\":[0,0,-1],\"power\":1}],"
+                                "\"sheet\":{\"bow_mm\":[1,0]}}";
+    static const char baked[] =
+        "{\"weft\":\"material\",\"version\":1,\"name\":\"a\",\"type\":\"clothmaterial\",\"width\":8,"
+        "\"height\":8,"
+        "\"size_mm\":[10,10],\"periodic\":true,\"maps\":{\"albedo\":{\"mips\":4,\"constant\":[1,1,1]}}}";
     const struct {
         const char *reader, *text;
         size_t n;
     } texts[] = {{"lp", lp, sizeof lp - 1},
+                 {"csv", csv, sizeof csv - 1},
+                 {"ihex", ihex, sizeof ihex - 1},
+                 {"maps", maps, sizeof maps - 1},
+                 {"directions", directions, sizeof directions - 1},
+                 {"scene", scene, sizeof scene - 1},
+                 {"baked", baked, sizeof baked - 1},
                  {"material", material, sizeof material - 1},
                  {"set", set, sizeof set - 1},
                  {"calibration", cal, sizeof cal - 1}};
@@ -136,6 +157,22 @@ static weft_err write_frame(const char *folder, weft_error *err)
     return weft_file_write(path, wire, n - 1, err);
 }
 
+static weft_err write_jpeg(const char *folder, weft_error *err)
+{
+    uint8_t rgb[16 * 16 * 3];
+    unsigned char *bytes;
+    size_t n;
+    char path[1024];
+    for (size_t i = 0; i < sizeof rgb; i++)
+        rgb[i] = (uint8_t)(i * 7);
+    WEFT_TRY(weft_jpeg_encode(rgb, 16, 16, 90, &bytes, &n, err));
+    weft_err status = seed_path(folder, "jpeg", "small", path, err);
+    if (status == WEFT_OK)
+        status = weft_file_write(path, bytes, n, err);
+    weft_jpeg_free(bytes);
+    return status;
+}
+
 /* The parameters that are read, as constants. */
 static weft_err write_archive(const char *folder, weft_error *err)
 {
@@ -159,19 +196,12 @@ int main(int argc, char **argv)
         fputs("usage: fuzz_seeds FOLDER\n", stderr);
         return 2;
     }
-    weft_err status = write_rasters(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_exrs(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_raws(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_texts(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_jobs(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_frame(argv[1], &error);
-    if (status == WEFT_OK)
-        status = write_archive(argv[1], &error);
+    static weft_err (*const writers[])(const char *, weft_error *) = {
+        write_rasters, write_exrs,  write_raws, write_texts,
+        write_jobs,    write_frame, write_jpeg, write_archive};
+    weft_err status = WEFT_OK;
+    for (size_t i = 0; i < sizeof writers / sizeof writers[0] && status == WEFT_OK; i++)
+        status = writers[i](argv[1], &error);
     if (status != WEFT_OK)
         weft_log_error("%s", error.text);
     return weft_err_exit_status(status);
