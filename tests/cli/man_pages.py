@@ -62,7 +62,7 @@ def main():
         assert option in daemon, option
     assert "weftd.service" in daemon and "weftd.socket" in daemon
     with tempfile.TemporaryDirectory() as folder:
-        run("cmake", "--install", BUILD, "--prefix", folder, "--component", "daemon")
+        run("cmake", "--install", BUILD, "--prefix", folder)
         installed = {name for part in ("man1", "man8") for name in os.listdir(f"{folder}/share/man/{part}")}
         assert installed == wanted, installed ^ wanted
         if shutil.which("man"):
