@@ -5,7 +5,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/shipped.h"
-#include "host/daemon/child.h"
+#include "host/process/child.h"
 
 #include <signal.h>
 #include <stdio.h>

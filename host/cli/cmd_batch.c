@@ -5,7 +5,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "host/batch/batch.h"
-#include "host/daemon/job_kinds.h"
+#include "host/client/job_kinds.h"
 
 #include <stdint.h>
 #include <string.h>

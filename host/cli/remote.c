@@ -4,8 +4,8 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
-#include "host/daemon/daemon_client.h"
-#include "host/daemon/job_kinds.h"
+#include "host/client/daemon_client.h"
+#include "host/client/job_kinds.h"
 
 #include <inttypes.h>
 #include <limits.h>

@@ -1,9 +1,9 @@
-#include "host/daemon/daemon_client.h"
+#include "host/client/daemon_client.h"
 
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/text.h"
-#include "host/daemon/daemon_socket.h"
+#include "host/client/daemon_socket.h"
 
 #include <errno.h>
 #include <poll.h>

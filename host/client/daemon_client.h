@@ -1,8 +1,8 @@
 /**
  * Talking to the daemon: HTTP/1.0 on its Unix socket, so that a reply is what comes until the end.
  */
-#ifndef WEFT_HOST_DAEMON_DAEMON_CLIENT_H
-#define WEFT_HOST_DAEMON_DAEMON_CLIENT_H
+#ifndef WEFT_HOST_CLIENT_DAEMON_CLIENT_H
+#define WEFT_HOST_CLIENT_DAEMON_CLIENT_H
 
 #include "core/error.h"
 

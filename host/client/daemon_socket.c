@@ -1,4 +1,4 @@
-#include "host/daemon/daemon_socket.h"
+#include "host/client/daemon_socket.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "host/daemon/job_kinds.h"
+#include "host/client/job_kinds.h"
 
 #include <string.h>
 

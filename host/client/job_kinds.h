@@ -5,8 +5,8 @@
  * A new command becomes a job by a row here.  A test goes over every option of every row that takes a text
  * and fails unless the row says what the text is.
  */
-#ifndef WEFT_HOST_DAEMON_JOB_KINDS_H
-#define WEFT_HOST_DAEMON_JOB_KINDS_H
+#ifndef WEFT_HOST_CLIENT_JOB_KINDS_H
+#define WEFT_HOST_CLIENT_JOB_KINDS_H
 
 #include <stdbool.h>
 #include <stddef.h>

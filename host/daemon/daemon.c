@@ -5,7 +5,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/shipped.h"
-#include "host/daemon/daemon_socket.h"
+#include "host/client/daemon_socket.h"
 #include "host/daemon/http_server.h"
 #include "host/daemon/listen.h"
 #include "host/daemon/token.h"

@@ -11,9 +11,9 @@
 
 #include "host/daemon/events.h"
 #include "host/daemon/live.h"
-#include "host/daemon/loop.h"
 #include "host/daemon/queue.h"
 #include "host/library/library_db.h"
+#include "host/process/loop.h"
 
 #include <stdbool.h>
 

@@ -10,7 +10,7 @@
 #ifndef WEFT_HOST_DAEMON_JOB_REQUEST_H
 #define WEFT_HOST_DAEMON_JOB_REQUEST_H
 
-#include "host/daemon/job_kinds.h"
+#include "host/client/job_kinds.h"
 #include "host/library/job_store.h"
 
 /** What the one who asks may do. */

@@ -3,7 +3,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/mem.h"
-#include "host/daemon/job_kinds.h"
+#include "host/client/job_kinds.h"
 #include "host/set/set.h"
 
 #include <dirent.h>

@@ -5,13 +5,13 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
-#include "host/daemon/child.h"
+#include "host/client/job_kinds.h"
 #include "host/daemon/job_holds.h"
-#include "host/daemon/job_kinds.h"
 #include "host/daemon/job_order.h"
 #include "host/daemon/job_request.h"
 #include "host/daemon/job_words.h"
 #include "host/library/catalogue.h"
+#include "host/process/child.h"
 
 #include <inttypes.h>
 #include <signal.h>

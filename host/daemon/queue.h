@@ -14,8 +14,8 @@
 
 #include "host/daemon/events.h"
 #include "host/daemon/live.h"
-#include "host/daemon/loop.h"
 #include "host/library/job_store.h"
+#include "host/process/loop.h"
 
 #include <stdbool.h>
 

@@ -1,6 +1,6 @@
 /* Jobs and their events. */
+#include "host/client/job_kinds.h"
 #include "host/daemon/http_watch.h"
-#include "host/daemon/job_kinds.h"
 
 #include "core/mem.h"
 #include "core/text.h"

@@ -4,7 +4,7 @@
  * weft-docs man DIR DATE: the manual pages; the build does that, into build/man.
  */
 #include "host/cli/command.h"
-#include "host/cli/docs_man.h"
+#include "host/docs/docs_man.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,12 +1,12 @@
-#include "host/cli/docs_man.h"
+#include "host/docs/docs_man.h"
 
 #include "core/file.h"
 #include "core/mem.h"
 #include "core/version.h"
 #include "host/camera/camera.h"
 #include "host/cli/command.h"
+#include "host/client/job_kinds.h"
 #include "host/daemon/daemon.h"
-#include "host/daemon/job_kinds.h"
 
 #include <ctype.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /** The manual pages, from the tables of the programs: weft(1), one page per command, weftd(8). */
-#ifndef WEFT_HOST_CLI_DOCS_MAN_H
-#define WEFT_HOST_CLI_DOCS_MAN_H
+#ifndef WEFT_HOST_DOCS_DOCS_MAN_H
+#define WEFT_HOST_DOCS_DOCS_MAN_H
 
 #include "core/error.h"
 #include "core/fields.h"

@@ -1,4 +1,4 @@
-#include "host/daemon/child.h"
+#include "host/process/child.h"
 
 #include "core/log.h"
 #include "core/mem.h"

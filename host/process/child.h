@@ -5,11 +5,11 @@
  * so that ending it ends what it has started; and it does nothing before weft_child_go(), so that the daemon
  * can write down that it runs.  One thread.
  */
-#ifndef WEFT_HOST_DAEMON_CHILD_H
-#define WEFT_HOST_DAEMON_CHILD_H
+#ifndef WEFT_HOST_PROCESS_CHILD_H
+#define WEFT_HOST_PROCESS_CHILD_H
 
 #include "core/error.h"
-#include "host/daemon/loop.h"
+#include "host/process/loop.h"
 
 #include <jansson.h>
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-#include "host/daemon/loop.h"
+#include "host/process/loop.h"
 
 #include "core/mem.h"
 

@@ -1,6 +1,6 @@
 /** The one loop of the daemon: descriptors and what to call when they are ready (epoll).  One thread. */
-#ifndef WEFT_HOST_DAEMON_LOOP_H
-#define WEFT_HOST_DAEMON_LOOP_H
+#ifndef WEFT_HOST_PROCESS_LOOP_H
+#define WEFT_HOST_PROCESS_LOOP_H
 
 #include "core/error.h"
 

@@ -135,7 +135,7 @@ def test_replies_are_as_described():
 def test_text_options_of_jobs():
     """A path that the daemon does not know as one would get around the library: what job_kinds.c does not say of a
     text is refused, and a row that says nothing of one is not finished."""
-    with open(f"{SOURCE}/host/daemon/job_kinds.c", encoding="utf-8") as code:
+    with open(f"{SOURCE}/host/client/job_kinds.c", encoding="utf-8") as code:
         text = code.read()
     chart = re.search(r"#define CHART (.*)", text)[1]
     rows = {m[1]: m[0].replace("CHART", chart) for m in re.finditer(r'\{\.command = "([^"]+)".*\},', text)}
@@ -157,7 +157,7 @@ def test_text_options_of_jobs():
                 assert reply.status == 422 and "cannot be given" in reply.json["error"]["message"], reply.bytes
             texts = {o["key"] for o in command["options"] if o["type"] in ("text", "texts")}
             assert known - {"*", "rig", "port", "camera"} <= texts, f"{name} has no {known - texts}"
-            assert texts <= known, f"{name}: is {texts - known} a path or a text? (host/daemon/job_kinds.c)"
+            assert texts <= known, f"{name}: is {texts - known} a path or a text? (host/client/job_kinds.c)"
 
 
 if __name__ == "__main__":

@@ -42,7 +42,10 @@ layers() {
     wrong host/photo 'host/(cli|daemon|library|capture|camera|light|rig)'
     wrong host/capture 'host/(cli|solve|rig)'
     wrong host/library 'host/(cli|daemon|capture|solve|camera|light|rig)'
-    wrong host/batch 'host/(cli|capture|solve|camera|light|rig|library)'
+    wrong host/batch 'host/(cli|capture|solve|camera|light|rig|library|daemon)'
+    wrong host/process 'calibration|shading|host/([^p][a-z]*|p[^r][a-z]*)'
+    wrong host/client 'calibration|shading|host/(cli|[^c][a-z]*|c[^l][a-z]*)'
+    wrong host/cli 'host/(daemon|docs)'
     wrong host/daemon 'host/(capture|solve|camera|light|rig)'
     return $bad
 }
