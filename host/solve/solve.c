@@ -10,6 +10,7 @@
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
 #include "host/solve/refuse.h"
+#include "host/solve/seams.h"
 #include "host/solve/site_albedo.h"
 #include "host/solve/solve_row.h"
 
@@ -174,6 +175,7 @@ static weft_err solve_all_rows(solve_job *job, const weft_solve_options *options
         WEFT_TRY(weft_site_albedo_finish(job->maps, job->plan->cfa, finish_part, job, err));
     else
         weft_parallel_rows(height, finish_rows, job);
+    weft_seams_doubt(job->maps);
     job->maps->albedo_is_srgb = job->cal->has_colour;
     return WEFT_OK;
 }

@@ -114,7 +114,7 @@ static double numpy_ns(const systems *s, double *worst_deg)
 /* ---- the table ---- */
 
 typedef struct figures {
-    double move, lsq, robust, search, gloss, svd, demosaic;
+    double move, lsq, robust, search, gloss, svd, demosaic, seams;
     double dgels, dgelsd, jacobi, relight, numpy;
     double worst[5];
 } figures;
@@ -125,6 +125,7 @@ static void measure_round(work *w, const systems *s, double *scaled, bool peers,
     work_take_less(&f->move, work_move_ns(w));
     work_take_less(&f->lsq, work_solve_ns(w, &weft_method_lsq, NULL, false));
     work_take_less(&f->demosaic, work_demosaic_ns(w));
+    work_take_less(&f->seams, work_seams_ns(w));
     work_take_less(&f->robust, work_solve_ns(w, &weft_method_robust, NULL, false));
     work_take_less(&f->search, work_solve_ns(w, &weft_method_robust, NULL, true));
     if (!peers)
@@ -179,6 +180,7 @@ static void print_figures(const figures *f)
     for (size_t i = 0; i < sizeof whole / sizeof whole[0]; i++)
         print_row(whole[i].name, whole[i].ns + f->demosaic, f->move, f->lsq + f->demosaic, -1);
     printf("of which the albedo's three planes           %9.1f\n", f->demosaic);
+    printf("beside these: what seams add to the uncertainty %6.1f\n", f->seams);
     printf("normals of given systems, against lsq without those planes%17s\n", "from lsq");
     print_row("lsq", f->lsq, f->move, f->lsq, -1);
     for (size_t i = 0; i < sizeof peers / sizeof peers[0]; i++)

@@ -2,6 +2,7 @@
 
 #include "core/mem.h"
 #include "core/parallel.h"
+#include "host/solve/seams.h"
 #include "host/solve/site_demosaic.h"
 #include "tests/host/dome.h"
 
@@ -201,6 +202,20 @@ double work_demosaic_ns(work *w)
     const double begin = work_now_s();
     memcpy(mosaic.data, rgb.data, pixels * sizeof(float));
     weft_site_demosaic_into(&mosaic, WEFT_CFA_RGGB, &rgb, NULL, NULL);
+    return (work_now_s() - begin) * 1e9 / (double)pixels;
+}
+
+double work_seams_ns(work *w)
+{
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    weft_maps maps = {.width = w->width,
+                      .height = w->height,
+                      .normal = {w->width, w->height, 3, w->out[0]},
+                      .albedo = {w->width, w->height, 3, w->out[3]},
+                      .uncertainty = {w->width, w->height, 1, w->out[8]},
+                      .mask = {w->width, w->height, w->bytes[2]}};
+    const double begin = work_now_s();
+    weft_seams_doubt(&maps);
     return (work_now_s() - begin) * 1e9 / (double)pixels;
 }
 

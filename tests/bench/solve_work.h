@@ -37,6 +37,9 @@ double work_move_ns(work *w);
 /** Of making three planes of the albedo's one, which is overwritten. */
 double work_demosaic_ns(work *w);
 
+/** Of what seams between yarns add to the uncertainty, of the last run's answers. */
+double work_seams_ns(work *w);
+
 /** *least becomes the smaller of both; NaN counts as nothing. */
 void work_take_less(double *least, double value);
 
