@@ -35,6 +35,17 @@ static int is_visible(const struct dirent *entry)
     return entry->d_name[0] != '.';
 }
 
+/* albedo.png beside albedo.exr is for looking at; mask.png says where the scan has an answer. */
+static bool is_for_looking(const char *file)
+{
+    if (!weft_path_has_suffix(file, ".png"))
+        return false;
+    char *const twin = weft_asprintf(NULL, "%.*s.exr", (int)strlen(file) - 4, file);
+    const bool has_twin = twin && weft_file_exists(twin);
+    weft_free(twin);
+    return has_twin;
+}
+
 /* A scan is the files of its folder. */
 static void hash_input(void *context, const char *path, bool is_scan)
 {
@@ -49,8 +60,7 @@ static void hash_input(void *context, const char *path, bool is_scan)
         h->status = weft_fail_errno(h->err, WEFT_ERR_IO, "%s: this scan cannot be read", path);
     for (int i = 0; i < n; i++) {
         char *const file = weft_path_join(path, names[i]->d_name, h->err);
-        if (file && weft_file_exists(file) &&
-            !weft_path_has_suffix(file, ".png")) /* those are for looking at */
+        if (file && weft_file_exists(file) && !is_for_looking(file))
             hash_file(h, file);
         weft_free(file);
         free(names[i]);

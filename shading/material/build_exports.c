@@ -10,6 +10,7 @@
 #include "shading/material/build_key.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 
 static bool has_runtime_layers(const weft_builder *b)
 {
@@ -33,6 +34,10 @@ static void key_export(const weft_builder *b, const weft_exporter *exporter, cha
             weft_build_key_text(&key, path, json_string_value(json_object_get(input, "sha256")));
     if (has_runtime_layers(b)) /* what a mask hides in the flattened maps is exported too */
         weft_build_key_text(&key, "runtime layers", b->composite_key);
+    char *const properties = json_dumps(b->properties, JSON_SORT_KEYS | JSON_COMPACT);
+    weft_build_key_text(&key, "properties", properties ? properties : ""); /* the report tells them */
+    free(properties);
+    weft_build_key_number(&key, "periodic", b->baked.periodic);
     weft_build_key_text(&key, "name", b->baked.name);
     weft_build_key_text(&key, "type", b->baked.type->name);
     weft_build_key_number(&key, "width_mm", b->baked.size_mm[0]);
@@ -109,7 +114,8 @@ weft_err weft_builder_make_exports(weft_builder *b, weft_error *err)
         const bool current = folder && weft_folder_exists(folder) && weft_builder_is_current(b, step, hex);
         weft_free(folder);
         weft_builder_note(b, step, current ? "kept" : "rebuilt",
-                          current ? "all maps are as they were" : "a map or the exporter changed");
+                          current ? "all that it writes is as it was"
+                                  : "a map, a property or the exporter changed");
         *(current ? &b->result->kept : &b->result->rebuilt) += 1;
         if (current)
             continue;
@@ -120,6 +126,8 @@ weft_err weft_builder_make_exports(weft_builder *b, weft_error *err)
             if (status == WEFT_OK)
                 status = make_runtime_layers(b, &layers, err);
         }
+        if (status == WEFT_OK)
+            status = weft_builder_begin(b, (const char *const[]){step, NULL}, err);
         if (status == WEFT_OK)
             status = export_one(b, *e, &whole, &layers, err);
         if (status == WEFT_OK)

@@ -49,6 +49,13 @@ bool weft_builder_file_is_there(const weft_builder *b, weft_baked_kind kind)
     return there;
 }
 
+bool weft_builder_file_is_current(const weft_builder *b, weft_baked_kind kind)
+{
+    char key[65];
+    key_file(b, kind, key);
+    return weft_builder_is_current(b, weft_baked_rows[kind].name, key) && weft_builder_file_is_there(b, kind);
+}
+
 /* The mean of a map that stays on disk and is not read again. */
 static void recall_mean(weft_builder *b, weft_baked_kind kind)
 {
@@ -69,8 +76,7 @@ weft_err weft_builder_write_maps(weft_builder *b, weft_error *err)
         const bool wanted =
             baked->maps[k].n_mips > 0 || (bumpy && is_lobe(b, kind) && kind != WEFT_BAKED_ANISOTROPY);
         key_file(b, kind, keys[k]);
-        stale[k] = wanted && !(weft_builder_is_current(b, weft_baked_rows[k].name, keys[k]) &&
-                               weft_builder_file_is_there(b, kind));
+        stale[k] = wanted && !weft_builder_file_is_current(b, kind);
         lobe_stale = lobe_stale || (stale[k] && is_lobe(b, kind));
     }
     const int levels = weft_baked_levels(baked->width, baked->height);
@@ -95,6 +101,13 @@ weft_err weft_builder_write_maps(weft_builder *b, weft_error *err)
     mips.max_levels = 0;
     weft_builder_note(b, "mips", "rebuilt", "of the maps below");
     WEFT_TRY(weft_mips_make(baked, &mips, err));
+    const char *written[WEFT_BAKED_COUNT + 2] = {"composite"};
+    int n_written = 1;
+    for (int k = 0; k < WEFT_BAKED_COUNT; k++)
+        if (baked->maps[k].mips[0].data)
+            written[n_written++] = weft_baked_rows[k].name;
+    if (n_written > 1)
+        WEFT_TRY(weft_builder_begin(b, written, err));
     for (int k = 0; k < WEFT_BAKED_COUNT; k++) {
         const weft_baked_kind kind = (weft_baked_kind)k;
         if (!baked->maps[k].mips[0].data) {

@@ -29,6 +29,13 @@ bool weft_builder_is_current(const weft_builder *b, const char *step, const char
 weft_err weft_builder_load(weft_builder *b, weft_error *err);
 /** A step is done and on record; here a build may be cancelled, and goes on later. */
 weft_err weft_builder_finish(weft_builder *b, const char *step, const char key[65], weft_error *err);
+/**
+ * Strikes steps off the record on disk before their files are written: a build that is killed between a file
+ * and its record must not leave the new file under the old key, which a change that is taken back would then
+ * trust.
+ * @param steps  NULL behind the last
+ */
+weft_err weft_builder_begin(weft_builder *b, const char *const steps[], weft_error *err);
 /** The first property that is not as it was, as a reason. */
 void weft_builder_explain_change(const weft_builder *b, char *why, size_t size);
 
@@ -44,6 +51,8 @@ weft_err weft_builder_make_detail(weft_builder *b, weft_error *err);
 /* ---- files: build_files.c ---- */
 
 bool weft_builder_file_is_there(const weft_builder *b, weft_baked_kind kind);
+/** Whether the file on disk holds the texels that b->texels[kind] stands for. */
+bool weft_builder_file_is_current(const weft_builder *b, weft_baked_kind kind);
 /** Makes the mips of what is not on disk as it should be, and writes those files. */
 weft_err weft_builder_write_maps(weft_builder *b, weft_error *err);
 /** Removes files of maps that the material no longer has. */

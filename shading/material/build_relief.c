@@ -61,7 +61,7 @@ weft_err weft_builder_make_height(weft_builder *b, weft_error *err)
     weft_build_key_end(&key, hex);
     memcpy(b->texels[WEFT_BAKED_HEIGHT], hex,
            sizeof hex); /* the file rounds: a key of what went in, not of it */
-    if (weft_builder_is_current(b, "step height", hex) && reuse(b, WEFT_BAKED_HEIGHT)) {
+    if (weft_builder_file_is_current(b, WEFT_BAKED_HEIGHT) && reuse(b, WEFT_BAKED_HEIGHT)) {
         weft_builder_note(b, "height", "kept", "its normals are as they were");
         return WEFT_OK;
     }
@@ -70,7 +70,6 @@ weft_err weft_builder_make_height(weft_builder *b, weft_error *err)
     WEFT_TRY(weft_height_integrate(&b->baked.maps[WEFT_BAKED_NORMAL].mips[0], NULL, scale, b->baked.periodic,
                                    &height, NULL, err));
     adopt(&b->baked, WEFT_BAKED_HEIGHT, &height);
-    json_object_set_new(b->keys, "step height", json_string(hex));
     return WEFT_OK;
 }
 
@@ -80,7 +79,7 @@ static const weft_baked_kind relief_kinds[] = {WEFT_BAKED_OCCLUSION, WEFT_BAKED_
 static bool reuse_all(weft_builder *b, const weft_baked_kind *kinds, int n)
 {
     for (int i = 0; i < n; i++)
-        if (!reuse(b, kinds[i]))
+        if (!weft_builder_file_is_current(b, kinds[i]) || !reuse(b, kinds[i]))
             return false;
     return true;
 }
@@ -129,14 +128,14 @@ weft_err weft_builder_make_relief(weft_builder *b, weft_error *err)
     weft_build_key_end(&key, hex);
     for (int i = 0; i < 4; i++)
         memcpy(b->texels[relief_kinds[i]], hex, sizeof hex);
-    if (weft_builder_is_current(b, "step relief", hex) && reuse_all(b, relief_kinds, 4)) {
+    const int n_kinds =
+        b->baked.maps[WEFT_BAKED_NORMAL].n_mips > 0 ? 4 : 3; /* curvature is that of normals */
+    if (reuse_all(b, relief_kinds, n_kinds)) {
         weft_builder_note(b, "occlusion, cavity, curvature", "kept", "the height is as it was");
         return WEFT_OK;
     }
     weft_builder_note(b, "occlusion, cavity, curvature", "rebuilt", "the height changed");
-    WEFT_TRY(compute_relief(b, err));
-    json_object_set_new(b->keys, "step relief", json_string(hex));
-    return WEFT_OK;
+    return compute_relief(b, err);
 }
 
 weft_err weft_builder_make_detail(weft_builder *b, weft_error *err)

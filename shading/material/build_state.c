@@ -41,6 +41,14 @@ static weft_err save_state(const weft_builder *b, weft_error *err)
     return status;
 }
 
+weft_err weft_builder_begin(weft_builder *b, const char *const steps[], weft_error *err)
+{
+    bool any = false;
+    for (; *steps; steps++)
+        any |= json_object_del(b->keys, *steps) == 0;
+    return any ? save_state(b, err) : WEFT_OK;
+}
+
 weft_err weft_builder_finish(weft_builder *b, const char *step, const char key[65], weft_error *err)
 {
     json_object_set_new(b->keys, step, json_string(key));

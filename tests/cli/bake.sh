@@ -70,6 +70,41 @@ for file in fresh.material/*.exr fresh.material/png/*.png; do cmp "$file" "coat.
 OMP_NUM_THREADS=3 "$weft" bake coat.radattr -o threads.material --export png >/dev/null
 for file in fresh.material/*.exr; do cmp "$file" "threads.material/${file#fresh.material/}"; done
 
+# stopped when some maps are new and others old: what is on record is what is on disk, so a change that is taken back
+# is built again, and no old height is taken for that of the new normals
+again() { "$weft" bake bump.radattr -o bump.material --size 96x64 >out 2>&1; }
+say_strength() { echo ":bump := ( opaquematerial :scan = \"twill.maps\" :normal_strength = $1 :albedo_tint_color = $1 )" >bump.radattr; }
+same_as() { for file in "$1"/*.exr; do cmp "$file" "bump.material/${file##*/}"; done; }
+say_strength 1 && again
+cp -r bump.material one.material
+rm bump.material/normal.exr && mkdir -p bump.material/normal.exr/in-the-way
+say_strength 0.5
+if again; then echo "FAILED: a map that cannot be written is no failure"; exit 1; fi
+if cmp -s {one,bump}.material/albedo.exr; then echo "FAILED: nothing was written before"; exit 1; fi
+rm -r bump.material/normal.exr && cp {one,bump}.material/normal.exr
+say_strength 1 && again
+same_as one.material
+say_strength 0.5 && again
+cp -r bump.material half.material
+cp {one,bump}.material/height.exr
+python3 - <<'TEXT'
+import json
+one, bump = (json.load(open(f"{name}.material/material.json")) for name in ("one", "bump"))
+bump["keys"]["height"] = one["keys"]["height"]
+del bump["keys"]["composite"]
+json.dump(bump, open("bump.material/material.json", "w"))
+TEXT
+again
+same_as half.material
+# where the scan has an answer is a part of it
+python3 - <<'TEXT'
+import pngfile
+w, h, bits, n, lines = pngfile.read("twill.maps/mask.png")
+pngfile.write("twill.maps/mask.png", w, h, bits, n, [[0] * (w * n // 2) + list(line)[w * n // 2:] for line in lines])
+TEXT
+again
+grep -q ' 0 rebuilt' out && { echo "FAILED: another mask of the scan changes nothing"; exit 1; }
+
 # judges
 if command -v exrinfo >/dev/null; then exrinfo -s fresh.material/*.exr >/dev/null; fi
 if command -v pngcheck >/dev/null; then pngcheck -q fresh.material/png/*.png; fi
