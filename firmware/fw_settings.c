@@ -26,12 +26,12 @@ static struct {
     uint8_t slot; /* that holds them */
 } settings;
 
-static void set_defaults(void)
+static void set_defaults(fw_settings_values *v)
 {
-    memset(&settings.values, 0, sizeof settings.values);
-    settings.values.n_lights = FW_N_LIGHTS;
-    settings.values.max_on_ms = FW_MAX_ON_MS;
-    memset(settings.values.trims, 255, sizeof settings.values.trims);
+    memset(v, 0, sizeof *v);
+    v->n_lights = FW_N_LIGHTS;
+    v->max_on_ms = FW_MAX_ON_MS;
+    memset(v->trims, 255, sizeof v->trims);
 }
 
 static bool are_sane(const fw_settings_values *v)
@@ -85,7 +85,7 @@ void fw_settings_init(void)
 {
     uint8_t bytes[SLOT_PLACE];
     bool found = false, damaged = false;
-    set_defaults();
+    set_defaults(&settings.values);
     settings.generation = 0;
     settings.slot = 1;
     settings.state = WEFT_SETTINGS_DEFAULTS;
@@ -101,14 +101,14 @@ void fw_settings_init(void)
         settings.generation = generation;
         settings.slot = slot;
         settings.state = WEFT_SETTINGS_UNREADABLE;
-        set_defaults();
+        set_defaults(&settings.values);
         if (bytes[1] == LAYOUT && bytes[2] == PAYLOAD) {
             unpack(bytes + HEAD);
             settings.state = WEFT_SETTINGS_LOADED;
         }
     }
     if (found ? settings.state == WEFT_SETTINGS_LOADED && !are_sane(&settings.values) : damaged) {
-        set_defaults();
+        set_defaults(&settings.values);
         settings.state = WEFT_SETTINGS_UNREADABLE;
     }
 }
@@ -240,11 +240,11 @@ static bool change(fw_settings_values *v, const weft_cfg_set_request *request)
 
 uint8_t fw_settings_set(const weft_cfg_set_request *request, weft_cfg_set_reply *reply)
 {
+    fw_settings_values v = settings.values;
     if (request->key == WEFT_KEY_DEFAULTS)
-        set_defaults();
+        set_defaults(&v);
     else if (settings.state == WEFT_SETTINGS_UNREADABLE)
         return WEFT_STATUS_EEPROM;
-    fw_settings_values v = settings.values;
     if (!change(&v, request))
         return WEFT_STATUS_BAD_ARG;
     if (!store(&v))

@@ -176,6 +176,20 @@ static void test_a_newer_layout_is_told_and_not_wiped(void **state)
     assert_int_equal(slot[1], 2);
 }
 
+/* An EEPROM that takes no byte more: what is not stored is not in use either. */
+static void test_what_cannot_be_stored_is_not_used(void **state)
+{
+    (void)state;
+    assert_int_equal(set_number(WEFT_KEY_N_LIGHTS, 0, 6), WEFT_STATUS_OK);
+    sim.eeprom_writes_left = 0;
+    assert_int_equal(set_number(WEFT_KEY_N_LIGHTS, 0, 7), WEFT_STATUS_EEPROM);
+    assert_int_equal(fw_settings()->n_lights, 6);
+    assert_int_equal(set_number(WEFT_KEY_DEFAULTS, 0, 0), WEFT_STATUS_EEPROM);
+    assert_int_equal(fw_settings()->n_lights, 6);
+    sim_board_start();
+    assert_int_equal(fw_settings()->n_lights, 6);
+}
+
 static void test_generations_wrap(void **state)
 {
     (void)state;
@@ -205,6 +219,7 @@ int main(void)
         TEST(test_power_may_go_at_every_write),
         TEST(test_damage_is_told_and_not_wiped),
         TEST(test_a_newer_layout_is_told_and_not_wiped),
+        TEST(test_what_cannot_be_stored_is_not_used),
         TEST(test_generations_wrap),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
