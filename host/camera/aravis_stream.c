@@ -254,7 +254,6 @@ static uint64_t missing_packets(const aravis_camera *a)
     return missing;
 }
 
-/* Whether the buffer is a whole frame of the kind that was asked for; else the reason in words. */
 /* A frame of another trigger than ours, as far as that can be known; else false. */
 static bool is_uncalled(const aravis_camera *a, ArvBuffer *buffer, double age_s, char reason[REASON_SIZE])
 {
@@ -275,6 +274,7 @@ static bool is_uncalled(const aravis_camera *a, ArvBuffer *buffer, double age_s,
     return true;
 }
 
+/* Whether the buffer is a whole frame of the kind that was asked for; else the reason in words. */
 static bool is_whole(const aravis_camera *a, ArvBuffer *buffer, uint64_t n_missing, char reason[REASON_SIZE])
 {
     const ArvBufferStatus status = arv_buffer_get_status(buffer);

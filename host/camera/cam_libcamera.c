@@ -273,14 +273,16 @@ static weft_err wait_for_ours(libcamera_state *s, double deadline_s, weft_camera
     while (weft_clock_s() < end_s) {
         weft_libcamera_frame f;
         const bool came = weft_libcamera_next(s->camera, SLICE_MS, &f);
-        WEFT_TRY(check_there(s, err));
-        if (idle)
-            WEFT_TRY(idle(idle_context, err));
+        weft_err status = check_there(s, err);
+        if (status == WEFT_OK && idle)
+            status = idle(idle_context, err);
+        if (status != WEFT_OK && came)
+            stop(s); /* takes the frame back */
+        WEFT_TRY(status);
         if (!came)
             continue;
         const uint32_t n_skipped = skipped(s, &f);
         const bool ours = is_ours(s, &f, triggered_s) || !f.good;
-        weft_err status = WEFT_OK;
         frame->sequence = f.sequence;
         if (n_skipped > 0) {
             frame->status = WEFT_FRAME_INCOMPLETE;

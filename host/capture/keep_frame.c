@@ -125,11 +125,11 @@ weft_err weft_capture_keep(weft_capture_state *run, weft_planned_frame *frame, j
         return weft_fail(err, WEFT_ERR_NOMEM, "no thread could be started to write %s", frame->file);
     for (;;) {
         struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
+        clock_gettime(CLOCK_MONOTONIC, &until);
         until.tv_nsec += 100000000;
         until.tv_sec += until.tv_nsec / 1000000000;
         until.tv_nsec %= 1000000000;
-        if (pthread_timedjoin_np(thread, NULL, &until) == 0)
+        if (pthread_clockjoin_np(thread, NULL, CLOCK_MONOTONIC, &until) == 0)
             break;
         if (awake == WEFT_OK)
             awake = weft_shooter_keep_alive(&run->shooter, &sleepy);

@@ -126,18 +126,14 @@ weft_err weft_job_store_get(weft_library_db *db, int64_t id, weft_job *job, weft
     return status;
 }
 
-weft_err weft_job_store_visit(weft_library_db *db, const weft_job_state *state, int64_t before, int limit,
-                              weft_err (*visit)(void *context, weft_job *job, weft_error *err), void *context,
-                              weft_error *err)
+typedef weft_err visit_fn(void *context, weft_job *job, weft_error *err);
+
+static weft_err visit_rows(weft_library_db *db, sqlite3_stmt *rows, visit_fn *visit, void *context,
+                           weft_error *err)
 {
-    sqlite3_stmt *rows;
-    bool more;
-    WEFT_TRY(weft_library_db_query(db, &rows, err,
-                                   "SELECT " COLUMNS " FROM jobs WHERE (?1 IS NULL OR state = ?1) AND "
-                                   "(?2 = 0 OR id < ?2) ORDER BY id DESC LIMIT ?3",
-                                   "sii", state ? state_names[*state] : NULL, before, (int64_t)limit));
     for (;;) {
         weft_job job;
+        bool more;
         WEFT_TRY(weft_library_db_next(db, &rows, &more, err));
         if (!more)
             return WEFT_OK;
@@ -151,6 +147,27 @@ weft_err weft_job_store_visit(weft_library_db *db, const weft_job_state *state, 
             return status;
         }
     }
+}
+
+weft_err weft_job_store_visit(weft_library_db *db, const weft_job_state *state, int64_t before, int limit,
+                              visit_fn *visit, void *context, weft_error *err)
+{
+    sqlite3_stmt *rows;
+    WEFT_TRY(weft_library_db_query(db, &rows, err,
+                                   "SELECT " COLUMNS " FROM jobs WHERE (?1 IS NULL OR state = ?1) AND "
+                                   "(?2 = 0 OR id < ?2) ORDER BY id DESC LIMIT ?3",
+                                   "sii", state ? state_names[*state] : NULL, before, (int64_t)limit));
+    return visit_rows(db, rows, visit, context, err);
+}
+
+weft_err weft_job_store_visit_queued(weft_library_db *db, int limit, visit_fn *visit, void *context,
+                                     weft_error *err)
+{
+    sqlite3_stmt *rows;
+    WEFT_TRY(weft_library_db_query(db, &rows, err,
+                                   "SELECT " COLUMNS " FROM jobs WHERE state = 'queued' ORDER BY id LIMIT ?",
+                                   "i", (int64_t)limit));
+    return visit_rows(db, rows, visit, context, err);
 }
 
 weft_err weft_job_store_started(weft_library_db *db, int64_t id, int64_t pid, int64_t pid_start, bool fresh,

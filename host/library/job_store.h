@@ -65,6 +65,10 @@ weft_err weft_job_store_get(weft_library_db *db, int64_t id, weft_job *job, weft
 weft_err weft_job_store_visit(weft_library_db *db, const weft_job_state *state, int64_t before, int limit,
                               weft_err (*visit)(void *context, weft_job *job, weft_error *err), void *context,
                               weft_error *err);
+/** The same for those that are queued, oldest first. */
+weft_err weft_job_store_visit_queued(weft_library_db *db, int limit,
+                                     weft_err (*visit)(void *context, weft_job *job, weft_error *err),
+                                     void *context, weft_error *err);
 
 /** queued -> running: one more attempt.  `fresh` is only ever set by the first attempt. */
 weft_err weft_job_store_started(weft_library_db *db, int64_t id, int64_t pid, int64_t pid_start, bool fresh,

@@ -20,7 +20,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MAX_LINE = 262144, REPORT_FD = 3 };
+enum { MAX_LINE = 262144, REPORT_FD = 3, MAX_AT_ONCE = 16, MOST_LEFT = 32 };
 
 /* A pipe from the child, cut into lines. */
 typedef struct stream {
@@ -113,7 +113,7 @@ static void read_stream(void *context, uint32_t events)
     stream *const s = context;
     char bytes[8192];
     (void)events;
-    for (int i = 0; i < 16 && s->fd >= 0; i++) { /* a flood waits for its turn */
+    for (int i = 0; i < MAX_AT_ONCE && s->fd >= 0; i++) { /* a flood waits for its turn */
         const ssize_t n = read(s->fd, bytes, sizeof bytes);
         if (n > 0)
             take_bytes(s, bytes, (size_t)n);
@@ -142,7 +142,7 @@ static void read_report(void *context, uint32_t events)
     weft_child *const c = context;
     char text[WEFT_REPORT_MAX];
     (void)events;
-    for (int i = 0; i < 16 && c->report >= 0; i++) {
+    for (int i = 0; i < MAX_AT_ONCE && c->report >= 0; i++) {
         union {
             struct cmsghdr header;
             char bytes[CMSG_SPACE(sizeof(int))];
@@ -179,7 +179,8 @@ static void on_exit_of_child(void *context, uint32_t events)
     if (waitpid(c->pid, &status, WNOHANG) != c->pid)
         return;
     c->pid = 0;
-    read_report(c, 0);
+    for (int i = 0; i < MOST_LEFT && c->report >= 0; i++) /* a full socket holds some hundred messages */
+        read_report(c, 0);
     stream *const streams[] = {&c->out, &c->err};
     for (int i = 0; i < 2; i++) {
         read_stream(streams[i], 0);
