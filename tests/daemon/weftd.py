@@ -1,6 +1,7 @@
 """A daemon under test: its process, requests over its socket, its events.  Used by the tests beside it."""
 import concurrent.futures
 import fcntl
+import glob
 import hashlib
 import http.client
 import json
@@ -220,6 +221,23 @@ def signal_all(pids, number):
             pass
 
 
+def wait_until_stopped(pids):
+    """Until SIGSTOP has reached every thread of the processes, or they have ended: a signal that came before would else
+    be taken before it."""
+    for pid in pids:
+        while True:
+            states = []
+            for task in glob.glob(f"/proc/{pid}/task/*/stat"):
+                try:
+                    with open(task, encoding="utf-8") as stat:
+                        states.append(stat.read().rpartition(")")[2].split()[0])
+                except OSError:
+                    pass
+            if all(state in "TZX" for state in states):
+                break
+            time.sleep(0.001)
+
+
 def stop_at_work(daemon, add):
     """Adds jobs by add(0), add(1), ... until the process of one is stopped (SIGSTOP) in the middle of its work: it has
     told progress and not all of it.  It runs in small steps, so that no load of the machine lets it slip through.
@@ -231,6 +249,7 @@ def stop_at_work(daemon, add):
             signal_all(pids, signal.SIGCONT)
             time.sleep(0.002)
             signal_all(pids, signal.SIGSTOP)
+            wait_until_stopped(pids)
             progress = daemon.job(job)["progress"]
             if pids and progress and progress["done"] < progress["total"] and all(alive(p) for p in pids):
                 return job, pids
