@@ -79,6 +79,12 @@ weft_err weft_image_read(const char *path, weft_transfer transfer, weft_image *i
     return status;
 }
 
+weft_err weft_image_check_name(const char *path, weft_error *err)
+{
+    file_kind kind;
+    return kind_of(path, true, &kind, err);
+}
+
 weft_err weft_image_write(const char *path, const weft_image *image, int bits, weft_transfer transfer,
                           weft_error *err)
 {

@@ -1,6 +1,7 @@
 #include "host/cli/preview_grid.h"
 
 #include "core/mem.h"
+#include "shading/preview/font.h"
 #include "shading/preview/sheet.h"
 
 #include <stdio.h>
@@ -48,6 +49,8 @@ static weft_err place_cell(const weft_preview_grid *g, const weft_preview_view *
         cell.lights[0] = view->lights[column];
     }
     snprintf(label, sizeof label, "%s %s", model, name ? setting : value);
+    if (weft_font_width(sheet->label_scale, label) > sheet->tile_width) /* the column at least */
+        snprintf(label, sizeof label, "%s", name ? setting : value);
     WEFT_TRY(weft_preview_input_load(&input, g->input, model, &params, err));
     weft_err status = weft_preview_render(&input.surface, &cell, &picture, err);
     if (status == WEFT_OK) {

@@ -3,6 +3,7 @@
 #include "host/cli/preview_lights.h"
 
 #include "core/file.h"
+#include "core/formats/image_file.h"
 #include "shading/preview/tone.h"
 
 #include <math.h>
@@ -397,6 +398,10 @@ weft_err weft_preview_options_check(const weft_preview_options *a, bool input, w
         return weft_fail(err, WEFT_ERR_USAGE,
                          "--watch draws one picture again; it goes with neither --match, --sweep nor "
                          "--turntable");
+    if (!weft_path_has_suffix(a->output, ".webp"))
+        WEFT_TRY(weft_image_check_name(a->output, err));
+    if (!a->columns && strchr(a->brdf, ',') && !weft_path_has_suffix(a->brdf, ".binary"))
+        return weft_fail(err, WEFT_ERR_USAGE, "several models of --brdf want --columns: each is a row");
     if (!a->match != !a->cal)
         return weft_fail(err, WEFT_ERR_USAGE, "--match SET and --calibration CAL go together");
     if (a->match && !input)

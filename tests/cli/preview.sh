@@ -122,6 +122,8 @@ dwebp -quiet first.webp -o first.png
 expect 0 '' "$weft" preview weave.maps -o still.png --shape drape --size 30x24 --draft
 expect 0 'PSNR             inf' "$weft" compare first.png still.png
 expect 2 'want --sweep N' "$weft" preview weave.maps -o x.webp
+expect 1 'x.jpg: a picture'"'"'s name must end in .exr, .png, .tif or .tiff' "$weft" preview absent.maps -o x.jpg
+expect 2 'each is a row' "$weft" preview -o x.png --brdf ggx,cloth
 expect 2 'neither with each other' "$weft" preview weave.maps -o x.webp --sweep 2 --turntable 2
 expect 2 'no lamp is written' "$weft" preview -o x.png --lamp ball:1,2
 expect 2 'radius above 0' "$weft" preview -o x.png --lamp ball:0,0,10,12

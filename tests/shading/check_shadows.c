@@ -1,6 +1,8 @@
 /* Shadows of the relief and of the folds against rays that leave nothing out. */
 #include "tests/support/support.h"
 
+#include "tests/shading/drape_mesh.h"
+
 #include "shading/brdf/half_vector.h"
 #include "shading/preview/bayer.h"
 #include "shading/preview/preview_visibility.h"
@@ -298,57 +300,6 @@ static void test_large_lamp(void **state)
 
 /* ---- the folds ---- */
 
-enum { MESH = 120 };
-
-static double vertices[MESH + 1][MESH + 1][3];
-
-static void make_mesh(void)
-{
-    for (int row = 0; row <= MESH; row++)
-        for (int column = 0; column <= MESH; column++) {
-            double slope[2], *const at = vertices[row][column];
-            at[0] = 2.0 * column / MESH - 1;
-            at[1] = 2.0 * row / MESH - 1;
-            at[2] = weft_preview_drape_height(at[0], at[1], slope);
-        }
-}
-
-/* Moller and Trumbore 1997, both sides. */
-static bool ray_meets(const double o[3], const double d[3], const double a[3], const double b[3],
-                      const double c[3])
-{
-    double e1[3], e2[3], s[3];
-    for (int k = 0; k < 3; k++) {
-        e1[k] = b[k] - a[k];
-        e2[k] = c[k] - a[k];
-        s[k] = o[k] - a[k];
-    }
-    const double p[3] = {d[1] * e2[2] - d[2] * e2[1], d[2] * e2[0] - d[0] * e2[2],
-                         d[0] * e2[1] - d[1] * e2[0]};
-    const double det = e1[0] * p[0] + e1[1] * p[1] + e1[2] * p[2];
-    if (fabs(det) < 1e-14)
-        return false;
-    const double u = (s[0] * p[0] + s[1] * p[1] + s[2] * p[2]) / det;
-    const double q[3] = {s[1] * e1[2] - s[2] * e1[1], s[2] * e1[0] - s[0] * e1[2],
-                         s[0] * e1[1] - s[1] * e1[0]};
-    const double v = (d[0] * q[0] + d[1] * q[1] + d[2] * q[2]) / det;
-    const double t = (e2[0] * q[0] + e2[1] * q[1] + e2[2] * q[2]) / det;
-    return u >= 0 && v >= 0 && u + v <= 1 && t > 1e-6;
-}
-
-/* Whether the mesh of the drape lets the light to a place near it: every triangle is asked. */
-static bool mesh_lit(const double from[3], const double to[3])
-{
-    for (int row = 0; row < MESH; row++)
-        for (int column = 0; column < MESH; column++) {
-            const double *const a = vertices[row][column], *const b = vertices[row + 1][column + 1];
-            if (ray_meets(from, to, a, vertices[row][column + 1], b) ||
-                ray_meets(from, to, a, b, vertices[row + 1][column]))
-                return false;
-        }
-    return true;
-}
-
 enum { PLACES = 400 };
 
 typedef struct place {
@@ -375,7 +326,7 @@ static int make_places(const double light[3], place *places)
         double off[3]; /* the mesh is flat between its corners: start as far off as it can be wrong */
         for (int c = 0; c < 3; c++)
             off[c] = p.at[c] + 2e-4 * p.normal[c];
-        p.lit = mesh_lit(off, light);
+        p.lit = !drape_mesh_meets(off, light);
         places[n++] = p;
     }
     return n;
@@ -388,7 +339,7 @@ static void test_voxels_against_the_mesh(void **state)
     double light[3];
     int dark = 0;
     weft_preview_direction(20, 25, light);
-    make_mesh();
+    drape_mesh_make();
     const int n = make_places(light, places);
     for (int k = 0; k < n; k++)
         dark += !places[k].lit;

@@ -1,6 +1,8 @@
 /* The preview's turned shapes: what may not change, what moves where, and the drape against its mesh. */
 #include "tests/support/support.h"
 
+#include "tests/shading/drape_mesh.h"
+
 #include "shading/brdf/half_vector.h"
 #include "shading/preview/preview.h"
 #include "shading/preview/preview_samples.h"
@@ -147,54 +149,7 @@ static void test_marks_move(void **state)
     }
 }
 
-enum { MESH = 120, SIDE = 28 };
-static double vertices[MESH + 1][MESH + 1][3];
-
-/* Distance along the ray to a triangle (Moller and Trumbore 1997), or infinity; its unit normal. */
-static double meet(const double o[3], const double d[3], const double *a, const double *b, const double *c,
-                   double n[3])
-{
-    double e1[3], e2[3], s[3];
-    for (int k = 0; k < 3; k++) {
-        e1[k] = b[k] - a[k];
-        e2[k] = c[k] - a[k];
-        s[k] = o[k] - a[k];
-    }
-    const double p[3] = {d[1] * e2[2] - d[2] * e2[1], d[2] * e2[0] - d[0] * e2[2],
-                         d[0] * e2[1] - d[1] * e2[0]};
-    const double det = e1[0] * p[0] + e1[1] * p[1] + e1[2] * p[2];
-    const double u = (s[0] * p[0] + s[1] * p[1] + s[2] * p[2]) / det;
-    const double q[3] = {s[1] * e1[2] - s[2] * e1[1], s[2] * e1[0] - s[0] * e1[2],
-                         s[0] * e1[1] - s[1] * e1[0]};
-    const double v = (d[0] * q[0] + d[1] * q[1] + d[2] * q[2]) / det;
-    if (fabs(det) < 1e-14 || u < 0 || v < 0 || u + v > 1)
-        return HUGE_VAL;
-    n[0] = e1[1] * e2[2] - e1[2] * e2[1];
-    n[1] = e1[2] * e2[0] - e1[0] * e2[2];
-    n[2] = e1[0] * e2[1] - e1[1] * e2[0];
-    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int k = 0; k < 3; k++)
-        n[k] /= length;
-    return (e2[0] * q[0] + e2[1] * q[1] + e2[2] * q[2]) / det;
-}
-
-/* |n.eye| of the nearest triangle, -1 beside the mesh. */
-static double facing(const double o[3], const double d[3])
-{
-    double nearest = HUGE_VAL, found = -1, n[3] = {0};
-    for (int row = 0; row < MESH; row++)
-        for (int column = 0; column < MESH; column++)
-            for (int k = 0; k < 2; k++) {
-                const double *const a = vertices[row][column], *const b = vertices[row + 1][column + 1];
-                const double *const c = k ? vertices[row + 1][column] : vertices[row][column + 1];
-                const double t = meet(o, d, a, b, c, n);
-                if (t < nearest) {
-                    nearest = t;
-                    found = fabs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]);
-                }
-            }
-    return found;
-}
+enum { SIDE = 28 };
 
 /* The turned drape under a lamp at the camera shows |n.eye|, as the nearest triangle of its mesh does. */
 static void test_drape_against_its_mesh(void **state)
@@ -203,13 +158,7 @@ static void test_drape_against_its_mesh(void **state)
     weft_preview_surface surface = surface_of("lambert", 16);
     weft_preview_view view = view_of(WEFT_PREVIEW_DRAPE, SIDE);
     int wrong = 0, on = 0;
-    for (int row = 0; row <= MESH; row++)
-        for (int column = 0; column <= MESH; column++) {
-            double slope[2], *const at = vertices[row][column];
-            at[0] = 2.0 * column / MESH - 1;
-            at[1] = 2.0 * row / MESH - 1;
-            at[2] = weft_preview_drape_height(at[0], at[1], slope);
-        }
+    drape_mesh_make();
     for (int c = 0; c < 3; c++)
         surface.params[c] = 1;
     view.draft = true;
@@ -225,7 +174,7 @@ static void test_drape_against_its_mesh(void **state)
             for (int x = 0; x < SIDE; x++) {
                 const double px = (x + 0.5 - SIDE / 2.0) / (0.92 * SIDE / 2),
                              py = (SIDE / 2.0 - y - 0.5) / (0.92 * SIDE / 2);
-                const double o[3] = {c * px - 2 * s, py, s * px + 2 * c}, want = facing(o, d);
+                const double o[3] = {c * px - 2 * s, py, s * px + 2 * c}, want = drape_mesh_facing(o, d);
                 const double got = (double)weft_image_row(&picture, 0, y)[x];
                 on += want >= 0;
                 wrong += fabs(got - fmax(want, 0)) > 0.07; /* the mesh is flat between its corners */
