@@ -78,7 +78,7 @@ static weft_err tell(const weft_invocation *inv, const rig_args *args, weft_erro
 /* Becomes weft-rig; returns only when that fails. */
 static weft_err become_rig(const weft_rig_options *o, weft_error *err)
 {
-    static const char *const places[] = {".", "../libexec/weft", NULL};
+    static const char *const places[] = {".", NULL};
     char program[PATH_MAX], size[32], seed[16], supersample[16];
     if (weft_shipped_find("weft-rig", places, program, err) != WEFT_OK)
         return weft_prefix(err, WEFT_ERR_MISSING, "the virtual scanner is not installed beside this program");

@@ -287,7 +287,7 @@ static bool alive(void *context)
 /* The one that was asked for, or that of this build. */
 static weft_err find_firmware(rig *r, weft_error *err)
 {
-    static const char *const places[] = {"../firmware", "../../share/weft", NULL};
+    static const char *const places[] = {"../firmware", "../share/weft", NULL};
     const char *const given = r->args->options.firmware;
     char built[PATH_MAX];
     if (!given && weft_shipped_find("weft-firmware.elf", places, built, err) != WEFT_OK)

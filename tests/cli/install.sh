@@ -4,7 +4,7 @@ set -u
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 
 cmake --install "$WEFT_TEST_BUILD" --prefix "$work/prefix" >log 2>&1 || { cat log; exit 1; }
-for file in bin/weft bin/weftd libexec/weft/weft-rig libexec/weft/weft-camera-aravis lib/weft/libweft_lens_opencv.so \
+for file in bin/weft bin/weftd bin/weft-rig libexec/weft/weft-camera-aravis lib/weft/libweft_lens_opencv.so \
     share/weft/weft-firmware.hex share/weft/weft-firmware.elf share/weft/library/cotton.radattr \
     share/man/man1/weft.1 share/man/man1/weft-calibrate-lens.1 share/man/man8/weftd.8 \
     share/bash-completion/completions/weft lib/udev/rules.d/70-weft.rules lib/systemd/system/weftd.service \
@@ -14,7 +14,7 @@ done
 
 # The parts of the product that are under another licence are a component of their own.
 cmake --install "$WEFT_TEST_BUILD" --prefix "$work/free" --component weft >log 2>&1 || { cat log; exit 1; }
-[ -x free/bin/weft ] && [ ! -e free/libexec/weft/weft-rig ] && [ ! -e free/bin/weftd ] ||
+[ -x free/bin/weft ] && [ ! -e free/bin/weft-rig ] && [ ! -e free/bin/weftd ] ||
     { echo "FAILED: the component weft is not weft alone"; exit 1; }
 expect 1 "the virtual scanner is not installed" free/bin/weft rig --dir rig
 
