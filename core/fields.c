@@ -288,7 +288,7 @@ static weft_err walk(parse *p, weft_error *err)
             WEFT_TRY(parse_option(p, err));
         else if (p->visit)
             WEFT_TRY(p->visit(p->context, NULL, word, err));
-        else
+        else if (p->operands)
             p->operands[p->n_operands++] = word;
     }
     return WEFT_OK;

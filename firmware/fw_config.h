@@ -57,8 +57,8 @@
 #define FW_RX_RING 128
 #define FW_TX_RING 128
 
-/** Bytes that the stack may need at its deepest, interrupts and all: tests/firmware/stack_bound.py finds the bound
- *  in the machine code, and check_size.cmake leaves it 1024. */
+/** Bytes that the stack may need at its deepest, interrupts and all: tests/firmware/stack_bound.py finds the
+ * bound in the machine code, and check_size.cmake leaves it 1024. */
 #define FW_STACK_BYTES 400
 
 /** us of a tick; a power of two, so that dividing by it is a shift. */
