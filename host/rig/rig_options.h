@@ -48,7 +48,7 @@ typedef struct weft_rig_options {
          .offset = WEFT_RIG_OPTION(args_type, member, address),                                              \
          .unit = "IP",                                                                                       \
          .def = "127.0.0.1",                                                                                 \
-         .help = "address of a network interface, at which the camera listens"},                                     \
+         .help = "address of a network interface, at which the camera listens"},                             \
         {.key = "supersample",                                                                               \
          .type = WEFT_FIELD_INT,                                                                             \
          .offset = WEFT_RIG_OPTION(args_type, member, supersample),                                          \
