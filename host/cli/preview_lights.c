@@ -30,6 +30,8 @@ static double length(const double v[3])
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+#define STRONGEST 1e6
+
 static weft_err check_lamp(const char *text, const weft_preview_light *light, weft_error *err)
 {
     double middle[3];
@@ -38,6 +40,10 @@ static weft_err check_lamp(const char *text, const weft_preview_light *light, we
                                                      : light->position_mm[c];
     if (light->kind != WEFT_PREVIEW_DISTANT && !(length(middle) > 0))
         return weft_fail(err, WEFT_ERR_USAGE, "the lamp %s wants X,Y,Z away from the origin", text);
+    if (light->kind != WEFT_PREVIEW_DISTANT && !(length(light->position_mm) <= WEFT_PREVIEW_FARTHEST_MM &&
+                                                 length(light->end_mm) <= WEFT_PREVIEW_FARTHEST_MM))
+        return weft_fail(err, WEFT_ERR_USAGE, "the lamp %s is farther than %g mm; AZ,EL is a distant one",
+                         text, WEFT_PREVIEW_FARTHEST_MM);
     if (light->kind == WEFT_PREVIEW_BALL && !(light->radius_mm > 0 && light->radius_mm < length(middle)))
         return weft_fail(err, WEFT_ERR_USAGE,
                          "the lamp %s wants a radius above 0 and below its distance from the origin", text);
@@ -59,9 +65,9 @@ weft_err weft_preview_lamp(const char *text, weft_preview_light *light, weft_err
                          text);
     const double *const v = arg.numbers.values;
     const double strength = arg.numbers.n > kind->n ? v[kind->n] : 1;
-    if (!(strength >= 0) || (kind->kind == WEFT_PREVIEW_DISTANT && fabs(v[1]) > 90))
-        return weft_fail(err, WEFT_ERR_USAGE, "the lamp %s wants EL from -90 to 90 and a strength from 0 on",
-                         text);
+    if (!(strength >= 0 && strength <= STRONGEST) || (kind->kind == WEFT_PREVIEW_DISTANT && fabs(v[1]) > 90))
+        return weft_fail(err, WEFT_ERR_USAGE,
+                         "the lamp %s wants EL from -90 to 90 and a strength from 0 to %g", text, STRONGEST);
     for (int c = 0; c < 3; c++) {
         light->irradiance[c] = WEFT_PI * strength;
         light->position_mm[c] = v[c];

@@ -5,6 +5,9 @@
 #include "core/fields.h"
 #include "shading/preview/preview.h"
 
+/** No lamp is farther: the squares of single precision end at 1e19. */
+#define WEFT_PREVIEW_FARTHEST_MM 1e9
+
 /**
  * Reads one lamp: "AZ,EL", "mm:X,Y,Z", "ball:X,Y,Z,RADIUS" or "tube:X,Y,Z,X,Y,Z" (mm), each optionally with
  * ",STRENGTH" behind (1: a white card at the origin that faces it reads 1).

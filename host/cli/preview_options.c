@@ -309,9 +309,11 @@ const weft_field weft_preview_fields[] = {
 static weft_err set_light(weft_preview_light *light, const weft_preview_options *a, weft_error *err)
 {
     if (a->light_mm.n) {
-        if (a->light_mm.n != 3 ||
-            !(hypot(hypot(a->light_mm.values[0], a->light_mm.values[1]), a->light_mm.values[2]) > 0))
-            return weft_fail(err, WEFT_ERR_USAGE, "--light-mm wants X,Y,Z away from the origin");
+        const double *const v = a->light_mm.values, far_mm = hypot(hypot(v[0], v[1]), v[2]);
+        if (a->light_mm.n != 3 || !(far_mm > 0 && far_mm <= WEFT_PREVIEW_FARTHEST_MM))
+            return weft_fail(err, WEFT_ERR_USAGE,
+                             "--light-mm wants X,Y,Z away from the origin and within %g mm",
+                             WEFT_PREVIEW_FARTHEST_MM);
         light->kind = WEFT_PREVIEW_POINT;
         for (int c = 0; c < 3; c++)
             light->position_mm[c] = a->light_mm.values[c];

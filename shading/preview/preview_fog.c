@@ -114,7 +114,8 @@ static void add_lamp(const fog_job *job, const weft_preview_light *light, const 
     const double half_mm = job->half * job->setup->surface->mm_per_px, step = ray->length / fog->steps;
     const bool large = light->kind == WEFT_PREVIEW_BALL || light->kind == WEFT_PREVIEW_TUBE;
     for (int k = 0; k < fog->steps; k++) {
-        const double t = step * (k + b), depth = ray->length - t; /* from the eye's side of the box */
+        const double t = step * (k + b),
+                     near = step * (fog->steps - k - 1); /* to the eye's side of the box */
         double at[3], to[3], cosine = 0;
         for (int c = 0; c < 3; c++) {
             at[c] = ray->from[c] + t * ray->to_eye[c];
@@ -130,9 +131,9 @@ static void add_lamp(const fog_job *job, const weft_preview_light *light, const 
             continue;
         const double scattered = weft_phase_henyey_greenstein(fog->g, cosine) * (double)one->irradiance[0] *
                                  (large ? WEFT_PREVIEW_AREA_POINTS : 1);
-        /* the step's own share of e^(-sigma s), which is exact for even light */
-        const double share = fog->even ? fog->depth / fog->steps
-                                       : exp(-job->sigma * depth) * 2 * sinh(0.5 * job->sigma * step);
+        /* the whole step's share of e^(-sigma s), wherever in it the look is: exact for even light */
+        const double share =
+            fog->even ? fog->depth / fog->steps : exp(-job->sigma * near) * -expm1(-job->sigma * step);
         for (int c = 0; c < 3; c++)
             sum[c] += share * scattered * light->irradiance[c];
     }

@@ -126,6 +126,9 @@ expect 1 'x.jpg: a picture'"'"'s name must end in .exr, .png, .tif or .tiff' "$w
 expect 2 'each is a row' "$weft" preview -o x.png --brdf ggx,cloth
 expect 2 'neither with each other' "$weft" preview weave.maps -o x.webp --sweep 2 --turntable 2
 expect 2 'no lamp is written' "$weft" preview -o x.png --lamp ball:1,2
+expect 2 'AZ,EL is a distant one' "$weft" preview -o x.png --lamp tube:1e20,0,1,-1e20,0,2
+expect 2 'strength from 0 to 1e+06' "$weft" preview -o x.png --lamp 10,20,1e300
+expect 2 'within 1e+09 mm' "$weft" preview -o x.png --light-mm 1e300,0,1
 expect 2 'radius above 0' "$weft" preview -o x.png --lamp ball:0,0,10,12
 expect 2 'EL from 0 to 90' "$weft" preview -o x.png --sky 10,-5
 expect 0 'blue.png' "$weft" preview -o blue.png --brdf ggx --shape sphere --sky 225,40 --lamp 225,40 --tone agx --size 48x48 --polarise 0.4,0.6,1
