@@ -20,7 +20,7 @@ expect 1 "the virtual scanner is not installed" free/bin/weft rig --dir rig
 
 # In a name space of its own an empty folder lies over the build tree, where the system lets us.
 away() {
-    if unshare -m true 2>/dev/null; then
+    if unshare -m mount -t tmpfs none "$WEFT_TEST_BUILD" 2>/dev/null; then
         unshare -m sh -c 'mount -t tmpfs none "$0" && exec "$@"' "$WEFT_TEST_BUILD" "$@"
     else
         "$@"
