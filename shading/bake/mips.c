@@ -1,5 +1,6 @@
 #include "shading/bake/mips.h"
 
+#include "core/clones.h"
 #include "core/mem.h"
 #include "core/parallel.h"
 #include "shading/bake/gloss.h"
@@ -117,7 +118,9 @@ typedef struct level_job {
     weft_baked *baked;
     weft_mip_rule rule;
     int level;
-    float *scratch; /* per band: [3][MAX_TEXELS] */
+    float *scratch;          /* per band: [3][MAX_TEXELS] */
+    double *sums;            /* per band: [SUMS][w0] */
+    const float *anisotropy; /* [w0] the constant, for where there is no map */
 } level_job;
 
 /* The texels of level 0 that a texel of a level covers, [begin, end), with the shares of the first and last.
@@ -173,19 +176,88 @@ static double closest_of(const level_job *job, const extent *ex, const extent *e
     return weft_mip_closest(n, d2, a2, w);
 }
 
-static void sum_footprint(const level_job *job, const extent *ex, const extent *ey, footprint *f)
+/* Sums over the rows of level 0 that a row of the level covers, for each column of level 0. */
+enum { SUM_NORMAL = 0, SUM_ALPHA = 3, SUM_ALPHA2 = 4, SUM_SHORTENED = 5, SUMS = 8 };
+
+WEFT_CLONES
+static void add_scaled(double *sum, const float *values, double weight, int n)
 {
-    const weft_image *const normal = &job->baked->maps[WEFT_BAKED_NORMAL].mips[0];
-    for (int y = ey->begin; y < ey->end; y++)
-        for (int x = ex->begin; x < ex->end; x++) {
-            const double n[3] = {(double)weft_image_row(normal, 0, y)[x],
-                                 (double)weft_image_row(normal, 1, y)[x],
-                                 (double)weft_image_row(normal, 2, y)[x]};
-            const double alpha = alpha_at(job->baked, x, y);
-            /* with anisotropy, the widths of both axes in one number; put apart again below */
-            gather(f, n, alpha * sqrt(1 - anisotropy_at(job->baked, x, y)), share(ex, x) * share(ey, y),
-                   job->rule);
+    WEFT_INDEPENDENT
+    for (int u = 0; u < n; u++)
+        sum[u] += weight * (double)values[u];
+}
+
+/* With anisotropy, the widths of both axes in one number; put apart again in store_lobe(). */
+WEFT_CLONES
+static void add_widths(double *sum, double *squares, const float *along, const float *anisotropy,
+                       double weight, int n)
+{
+    WEFT_INDEPENDENT
+    for (int u = 0; u < n; u++) {
+        const double alpha = (double)along[u] * sqrt(1 - (double)anisotropy[u]);
+        sum[u] += weight * alpha;
+        squares[u] += weight * alpha * alpha;
+    }
+}
+
+/* Normals as long as the mean of their GGX; neighbours are mostly of one alpha. */
+static void add_shortened(double *sum, int n, const float *const normal[3], const float *along,
+                          const float *anisotropy, double weight)
+{
+    double last = -1, length = 0;
+    for (int u = 0; u < n; u++) {
+        const double alpha = (double)along[u] * sqrt(1 - (double)anisotropy[u]);
+        if (alpha != last)
+            length = 1 - weft_ggx_missing_length(alpha);
+        last = alpha;
+        for (int c = 0; c < 3; c++)
+            sum[(size_t)c * (size_t)n + (size_t)u] += weight * length * (double)normal[c][u];
+    }
+}
+
+/* @param sums        [SUMS][w0], overwritten
+ * @param anisotropy  [w0] that of a material without a map */
+static void sum_rows(const level_job *job, const extent *ey, const float *anisotropy, double *sums)
+{
+    const weft_baked_map *const maps = job->baked->maps;
+    const int w = job->baked->width;
+    const size_t n = (size_t)w;
+    memset(sums, 0, SUMS * n * sizeof *sums);
+    for (int y = ey->begin; y < ey->end; y++) {
+        const double weight = share(ey, y);
+        const float *const along = weft_image_row(&maps[WEFT_BAKED_ROUGHNESS].mips[0], 0, y);
+        const weft_baked_map *const s = &maps[WEFT_BAKED_ANISOTROPY];
+        const float *const turned = s->n_mips > 0 ? weft_image_row(&s->mips[0], 0, y) : anisotropy;
+        const float *normal[3];
+        for (int c = 0; c < 3; c++) {
+            normal[c] = weft_image_row(&maps[WEFT_BAKED_NORMAL].mips[0], c, y);
+            add_scaled(sums + (size_t)c * n, normal[c], weight, w);
         }
+        add_widths(sums + SUM_ALPHA * n, sums + SUM_ALPHA2 * n, along, turned, weight, w);
+        if (job->rule == WEFT_MIP_LENGTH)
+            add_shortened(sums + SUM_SHORTENED * n, w, normal, along, turned, weight);
+    }
+}
+
+/* Of the columns that a texel covers. */
+static footprint sum_columns(const level_job *job, const extent *ex, double rows, const double *sums)
+{
+    const size_t n = (size_t)job->baked->width;
+    footprint f = {0};
+    double *const to[SUMS] = {&f.mean[0], &f.mean[1],      &f.mean[2],      &f.alpha,
+                              &f.alpha2,  &f.shortened[0], &f.shortened[1], &f.shortened[2]};
+    const int planes = job->rule == WEFT_MIP_LENGTH ? SUMS : SUM_SHORTENED;
+    for (int k = 0; k < planes; k++) {
+        const double *const plane = sums + (size_t)k * n;
+        double sum = ex->first * plane[ex->begin];
+        for (int u = ex->begin + 1; u < ex->end - 1; u++)
+            sum += plane[u];
+        if (ex->end - ex->begin > 1)
+            sum += ex->last * plane[ex->end - 1];
+        *to[k] = sum;
+    }
+    f.weight = rows * (ex->end - ex->begin > 1 ? ex->end - ex->begin - 2 + ex->first + ex->last : ex->first);
+    return f;
 }
 
 /* What the normals add is added to both axes: alpha_t^2 + more, alpha_b^2 + more. */
@@ -213,12 +285,14 @@ static void normal_rows(void *context, int band, int begin, int end)
     weft_baked_map *const maps = job->baked->maps;
     weft_image *const normal = &maps[WEFT_BAKED_NORMAL].mips[job->level];
     float *const scratch = job->scratch + (size_t)band * 3 * MAX_TEXELS;
+    double *const sums = job->sums + (size_t)band * SUMS * (size_t)job->baked->width;
     for (int y = begin; y < end; y++) {
         const extent ey = extent_of(y, normal->height, job->baked->height);
+        const double rows = ey.end - ey.begin > 1 ? ey.end - ey.begin - 2 + ey.first + ey.last : ey.first;
+        sum_rows(job, &ey, job->anisotropy, sums);
         for (int x = 0; x < normal->width; x++) {
             const extent ex = extent_of(x, normal->width, job->baked->width);
-            footprint f = {0};
-            sum_footprint(job, &ex, &ey, &f);
+            const footprint f = sum_columns(job, &ex, rows, sums);
             const double length = norm(f.mean);
             double mean[3] = {0, 0, 1};
             for (int c = 0; c < 3; c++) {
@@ -340,13 +414,42 @@ static weft_err spread_roughness(weft_baked *baked, weft_baked_kind kind, weft_e
     return WEFT_OK;
 }
 
-static weft_err filter_level(weft_baked *baked, int level, const weft_mip_options *options, float *scratch,
-                             weft_error *err)
+/* What all levels of normals need. */
+typedef struct filter_scratch {
+    float *texels, *anisotropy;
+    double *sums;
+} filter_scratch;
+
+static void fini_scratch(filter_scratch *s)
+{
+    weft_free(s->texels);
+    weft_free(s->anisotropy);
+    weft_free(s->sums);
+}
+
+static weft_err init_scratch(filter_scratch *s, const weft_baked *baked, weft_error *err)
+{
+    const size_t bands = (size_t)weft_parallel_n_bands((baked->height + 1) / 2), width = (size_t)baked->width;
+    *s = (filter_scratch){.texels = weft_alloc(bands * 3 * MAX_TEXELS, sizeof *s->texels, err)};
+    if (s->texels)
+        s->anisotropy = weft_alloc(width, sizeof *s->anisotropy, err);
+    if (s->anisotropy)
+        s->sums = weft_alloc(bands * SUMS * width, sizeof *s->sums, err);
+    for (size_t i = 0; s->sums && i < width; i++)
+        s->anisotropy[i] = baked->maps[WEFT_BAKED_ANISOTROPY].constant[0];
+    if (s->sums)
+        return WEFT_OK;
+    fini_scratch(s);
+    return WEFT_ERR_NOMEM;
+}
+
+static weft_err filter_level(weft_baked *baked, int level, const weft_mip_options *options,
+                             const filter_scratch *scratch, weft_error *err)
 {
     WEFT_TRY(begin_level(baked, WEFT_BAKED_NORMAL, level, err));
     WEFT_TRY(begin_level(baked, WEFT_BAKED_NORMAL_LENGTH, level, err));
     WEFT_TRY(begin_level(baked, WEFT_BAKED_ROUGHNESS, level, err));
-    level_job job = {baked, options->rule, level, scratch};
+    level_job job = {baked, options->rule, level, scratch->texels, scratch->sums, scratch->anisotropy};
     const int rows = baked->maps[WEFT_BAKED_NORMAL].mips[level].height;
     return weft_parallel_rows_progress(rows, normal_rows, &job, "mips", err);
 }
@@ -412,10 +515,8 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
     int levels = weft_baked_levels(baked->width, baked->height);
     if (options->max_levels > 0 && options->max_levels < levels)
         levels = options->max_levels;
-    float *const scratch =
-        weft_alloc((size_t)weft_parallel_n_bands(baked->height) * 3 * MAX_TEXELS, sizeof *scratch, err);
-    if (!scratch)
-        return WEFT_ERR_NOMEM;
+    filter_scratch scratch;
+    WEFT_TRY(init_scratch(&scratch, baked, err));
     weft_err status = WEFT_OK;
     if (bumpy && (status = spread_roughness(baked, WEFT_BAKED_ROUGHNESS, err)) == WEFT_OK &&
         (status = weft_baked_add(baked, WEFT_BAKED_NORMAL_LENGTH, baked->width, baked->height, err)) ==
@@ -428,7 +529,7 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
             if (baked->maps[k].n_mips > 0 && !(bumpy && is_filtered(baked, (weft_baked_kind)k)))
                 status = average_level(baked, (weft_baked_kind)k, level, options, err);
         if (status == WEFT_OK && bumpy)
-            status = filter_level(baked, level, options, scratch, err);
+            status = filter_level(baked, level, options, &scratch, err);
     }
     if (status == WEFT_OK && bumpy && baked->two_lobes)
         status = filter_cloth(baked, levels, options, err);
@@ -437,6 +538,6 @@ weft_err weft_mips_make(weft_baked *baked, const weft_mip_options *options, weft
             baked->maps[k].n_mips = levels;
     if (status == WEFT_OK)
         note_means(baked);
-    weft_free(scratch);
+    fini_scratch(&scratch);
     return status;
 }
