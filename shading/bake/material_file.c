@@ -71,6 +71,10 @@ static weft_err read_map_head(const json_t *maps, weft_baked *baked, weft_baked_
     return WEFT_OK;
 }
 
+/* Of a side of a cloth. */
+#define SMALLEST_MM 1e-3
+#define LARGEST_MM  1e6
+
 static weft_err read_head(const json_t *json, const char *place, weft_baked *baked, weft_error *err)
 {
     const char *name, *type;
@@ -90,6 +94,12 @@ static weft_err read_head(const json_t *json, const char *place, weft_baked *bak
     baked->width = width;
     baked->height = height;
     WEFT_TRY(weft_json_get_numbers(json, "size_mm", WEFT_JSON_REQUIRED, 2, baked->size_mm, place, err));
+    for (int i = 0; i < 2; i++) { /* 0: not known */
+        const double size = baked->size_mm[i];
+        if (size != 0 && !(size >= SMALLEST_MM && size <= LARGEST_MM))
+            return weft_fail(err, WEFT_ERR_RANGE, "%s: \"size_mm\" has %g, wanted %g to %g; bake it again",
+                             place, size, SMALLEST_MM, LARGEST_MM);
+    }
     WEFT_TRY(weft_json_get_bool(json, "periodic", WEFT_JSON_OPTIONAL, &baked->periodic, place, err));
     WEFT_TRY(
         weft_json_get_bool(json, "enable_diffuse", WEFT_JSON_OPTIONAL, &baked->enable_diffuse, place, err));

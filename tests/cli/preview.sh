@@ -32,6 +32,13 @@ for filter in samples trilinear anisotropic; do
     expect 0 "cloth-$filter.png: 50 x 38, ggx" "$weft" preview cloth.material -o "cloth-$filter.png" --brdf ggx --size 50x38 --filter "$filter" --draft
     is_png "cloth-$filter.png" 50 38
 done
+# a size that no cloth has is refused before it becomes the scale of everything
+for size in '[-5, 3]' '[1e300, 1]'; do
+    jq ".size_mm = $size" cloth.material/material.json >head.json
+    cp -r cloth.material damaged.material && cp head.json damaged.material/material.json
+    expect 1 '"size_mm" has' "$weft" preview damaged.material -o damaged.png
+    rm -r damaged.material
+done
 cmp cloth-trilinear.png cloth-anisotropic.png
 refuse cmp cloth-samples.png cloth-anisotropic.png
 
