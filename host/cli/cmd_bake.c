@@ -87,7 +87,7 @@ static const weft_field fields[] = {
     {.key = "format",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(bake_args, format),
-     .help = "only rewrite the text in the one way it is written"},
+     .help = "only rewrite the text in the one way it is written; with --check only say whether it is"},
     {.key = "explain",
      .type = WEFT_FIELD_FLAG,
      .offset = offsetof(bake_args, explain),
@@ -102,7 +102,7 @@ static const weft_field fields[] = {
 
 /* -- the text ----------------------------------------------------------------------------------------- */
 
-static weft_err rewrite(const weft_invocation *inv, const char *path, weft_error *err)
+static weft_err rewrite(const weft_invocation *inv, const char *path, bool only_check, weft_error *err)
 {
     char *text = NULL, *formatted = NULL;
     size_t n, n_formatted = 0;
@@ -123,7 +123,10 @@ static weft_err rewrite(const weft_invocation *inv, const char *path, weft_error
         weft_diagnostics_print(&diagnostics, stderr);
     } else {
         const bool same = n_formatted == n && memcmp(text, formatted, n) == 0;
-        if (!same)
+        if (!same && only_check)
+            status = weft_fail(err, WEFT_ERR_FORMAT,
+                               "%s: is not in the one form; weft bake --format rewrites it", path);
+        else if (!same)
             status = weft_file_write(path, formatted, n_formatted, err);
         if (status == WEFT_OK)
             fprintf(inv->out, "%s: %s\n", path, same ? "is as it should be" : "rewritten");
@@ -268,7 +271,7 @@ static weft_err run(const weft_invocation *inv, const void *void_args, weft_erro
     if (args->format && is_u3m(inv->operands[0]))
         return weft_fail(err, WEFT_ERR_USAGE, "--format is for texts (.radattr)");
     if (args->format)
-        return rewrite(inv, inv->operands[0], err);
+        return rewrite(inv, inv->operands[0], args->check, err);
     const char *library = args->library;
     if (!library && weft_shipped_path("library", shipped, NULL) == WEFT_OK)
         library = shipped; /* without it a text that includes from it says so */

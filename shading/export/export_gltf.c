@@ -401,9 +401,16 @@ static weft_err write_glb(const glb *g, const char *path, weft_error *err)
     if (!json)
         return weft_fail(err, WEFT_ERR_NOMEM, "out of memory");
     const size_t n_json = strlen(json), pad = (4 - n_json % 4) % 4, pad_bin = (4 - g->bin.n % 4) % 4;
+    const size_t total = 12 + 8 + n_json + pad + 8 + g->bin.n + pad_bin;
+    if (total > UINT32_MAX) {
+        free(json);
+        return weft_fail(err, WEFT_ERR_RANGE,
+                         "%s: would have %zu bytes, a .glb has at most 4 GiB; give a smaller --size", path,
+                         total);
+    }
     weft_text_add_bytes(&out, "glTF", 4);
     weft_text_add_le(&out, 2, 4);
-    weft_text_add_le(&out, 12 + 8 + n_json + pad + 8 + g->bin.n + pad_bin, 4);
+    weft_text_add_le(&out, total, 4);
     weft_text_add_le(&out, n_json + pad, 4);
     weft_text_add_bytes(&out, "JSON", 4);
     weft_text_add_bytes(&out, json, n_json);

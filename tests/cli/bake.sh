@@ -111,6 +111,11 @@ if command -v pngcheck >/dev/null; then pngcheck -q fresh.material/png/*.png; fi
 
 # the text
 expect 0 'is as it should be' "$weft" bake "$WEFT_TEST_SOURCE/shading/material/library/silk.radattr" --format
+printf ':a:=(opaquematerial :opacity=1)\n' >loose.radattr
+expect 1 'is not in the one form' "$weft" bake loose.radattr --format --check
+grep -q ':a:=' loose.radattr
+expect 0 'rewritten' "$weft" bake loose.radattr --format
+expect 0 'is as it should be' "$weft" bake loose.radattr --format --check
 expect 0 ':albedo_color = ( :r = 0.07 :g = 0.07 :b = 0.07 )  // dirt' \
     "$weft" bake house.radattr --material dirt --explain
 expect 1 "there is no material 'thrad'; did you mean 'thread'?" "$weft" bake house.radattr --material thrad --explain
