@@ -39,13 +39,13 @@ if [ -n "${WEFT_ALL_FAULTS:-}" ]; then
     ratios=(0.00001 0.0001 0.001)
     deeds=(crash@expose:3 hang@expose:3 loose@expose:3 garbage@expose:3)
 fi
-# lossy_set RATIO: three in ten frames lose a packet at 0.001, so a light may fail its three tries; the set is
-# then resumed, as its user would.
+# lossy_set RATIO: three in ten frames lose a packet at 0.001, so a light may fail its three tries, and on a busy
+# machine the simulated board may be late by a second; the set is then resumed, as its user would.
 lossy_set() {
     local again=(--force)
     for _ in 1 2 3 4 5 6; do
         "${capture[@]}" --camera aravis:127.0.0.1,packet=1400 "$dir/loss-$1.set" "${again[@]}" 2>"$dir/err" && break
-        grep -q 'packets missing' "$dir/err" || fail "packet loss $1: $(cat "$dir/err")"
+        grep -Eq 'packets missing|does not answer' "$dir/err" || fail "packet loss $1: $(cat "$dir/err")"
         again=(--resume)
     done
     check_files "$dir/loss-$1.set" complete 11
@@ -68,10 +68,12 @@ expect 1 "none of its frames arrives; let a firewall pass UDP" "${capture[@]}" "
 [ ! -e "$dir/first.set/set.json" ] || [ ! -e "$dir/first.set/light-00.dng" ] || fail "no first frame: there is one"
 row "no first frame"
 
-(sleep 0.3; tell "camera blackout 4" >/dev/null) 9>&- &
-WEFT_CAMERA_PATIENCE=20 "${capture[@]}" --exposure 0.1 "$dir/blackout.set" 2>"$dir/err"
+WEFT_CAMERA_PATIENCE=20 "${capture[@]}" --exposure 0.1 "$dir/blackout.set" >/dev/null 2>"$dir/err" 9>&- &
+pid=$!
+wait_for_frames "$dir/blackout.set" 2
+tell "camera blackout 4" >/dev/null
+wait $pid
 status=$?
-wait %2 2>/dev/null
 [ $status = 0 ] || grep -q "camera 127.0.0.1" "$dir/err" || fail "blackout: exit $status, says $(cat "$dir/err")"
 sleep 4
 row "camera answers nothing for a while"

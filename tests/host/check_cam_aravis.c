@@ -21,9 +21,15 @@ static int end_fake(void **state)
     return 0;
 }
 
+/* A busy machine may lose packets of any frame: the next try is as good. */
 static void expose_whole(weft_camera_device *camera, weft_captured_frame *frame)
 {
-    assert_ok(weft_camera_expose(camera, DEADLINE_S, frame, err));
+    enum { TRIES = 10 };
+    for (int i = 0; i < TRIES; i++) {
+        assert_ok(weft_camera_expose(camera, DEADLINE_S, frame, err));
+        if (frame->status == WEFT_FRAME_COMPLETE || !strstr(frame->reason, "packets missing"))
+            break;
+    }
     if (frame->status != WEFT_FRAME_COMPLETE)
         fail_msg("status %d: %s", frame->status, frame->reason);
 }
@@ -384,11 +390,11 @@ static void test_a_wait_can_be_cancelled(void **state)
     fake_camera_start(&fake, "BayerRG16", "64x64");
     assert_ok(weft_camera_open("aravis:127.0.0.1", &camera, err));
     expose_whole(camera, &frame);
-    fake_camera_tell(&fake, "delay 4000");
+    fake_camera_tell(&fake, "delay 40000");
     weft_camera_set_idle(camera, cancel, NULL);
     const double start_s = weft_clock_s();
-    assert_fails(weft_camera_expose(camera, 5, &frame, err), WEFT_ERR_CANCELLED, "enough");
-    assert_true(weft_clock_s() - start_s < 3);
+    assert_fails(weft_camera_expose(camera, 50, &frame, err), WEFT_ERR_CANCELLED, "enough");
+    assert_true(weft_clock_s() - start_s < 20); /* and not when the frame comes */
     weft_camera_set_idle(camera, NULL, NULL);
     weft_mosaic_fini(&frame.mosaic);
     weft_camera_close(camera);

@@ -124,8 +124,8 @@ static void test_frames_and_settings_pass_unchanged(void **state)
         assert_true(frame.exposure_s == 1e-4 * i && frame.sequence == (uint64_t)i);
         assert_true(frame.mosaic.cfa == WEFT_CFA_GRBG && frame.mosaic.white == 15871);
     }
-    assert_fails(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 6}, err), WEFT_ERR_RANGE,
-                 "camera 1: only to 5 s");
+    assert_fails(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 61}, err),
+                 WEFT_ERR_RANGE, "camera 1: only to 60 s");
     expose_whole(camera, &frame); /* a refusal changes nothing */
     assert_true(frame.exposure_s == 1e-4 * 19);
     let_go(camera, &frame);
@@ -302,11 +302,11 @@ static void check_cancel(const char *address, double close_within_s)
 {
     weft_captured_frame frame = {0};
     weft_camera_device *const camera = open_drawn(address);
-    assert_ok(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 3}, err));
+    assert_ok(weft_camera_configure(camera, &(weft_camera_settings){.exposure_s = 30}, err));
     weft_camera_set_idle(camera, enough, NULL);
     double start_s = weft_clock_s();
     assert_fails(weft_camera_expose(camera, 5, &frame, err), WEFT_ERR_CANCELLED, "enough");
-    assert_true(weft_clock_s() - start_s < 2.5); /* and not the 3 s of the exposure */
+    assert_true(weft_clock_s() - start_s < 15); /* and not the 30 s of the exposure */
     weft_camera_set_idle(camera, NULL, NULL);
     if (strcmp(address, "1") == 0) { /* a helper that obeys goes on: no frame of before the cancellation */
         const long process = weft_camera_process(camera);

@@ -59,8 +59,8 @@ static weft_err drawn_configure(void *state, const weft_camera_settings *wanted,
                                 weft_error *err)
 {
     drawn_camera *const c = state;
-    if (wanted->exposure_s > 5)
-        return weft_fail(err, WEFT_ERR_RANGE, "camera %s: only to 5 s", c->address);
+    if (wanted->exposure_s > 60)
+        return weft_fail(err, WEFT_ERR_RANGE, "camera %s: only to 60 s", c->address);
     c->set = *wanted;
     info->exposure_s = wanted->exposure_s > 0 ? wanted->exposure_s : 0.01;
     info->gain = wanted->gain > 0 ? wanted->gain : 1;
