@@ -5,9 +5,10 @@ set -u
 version=$(sed -n 's/^#define FW_VERSION_MINOR \(.*\)/1.\1.0/p' "$WEFT_TEST_SOURCE/firmware/fw_config.h")
 avr-objcopy -O ihex "$programs/firmware-1.0.elf" old.hex
 
-# A blank chip, then an update of an older firmware: what the EEPROM holds stays.
+# A blank chip, then an update of an older firmware: what the EEPROM holds stays.  Before, the bootloader's answer has
+# no sense, or has been missed: either is told with the remedy.
 board uno none "$optiboot"
-expect 1 '(weft flash)' "$weft" light status --port "$pty"
+expect 1 'weft flash' "$weft" light status --port "$pty"
 expect_patiently 0 'firmware  none that is known -> 1.0.0' "$weft" flash --port "$pty" --image old.hex
 also 'settings  unknown before'
 expect_patiently 0 'serial WL-00042' "$weft" light set serial WL-00042 --port "$pty"
