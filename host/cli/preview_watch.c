@@ -11,21 +11,22 @@
 
 #define LOOK_NS 200000000 /* between two looks at the files */
 
-/* FNV-1a */
-static uint64_t mix(uint64_t hash, const void *bytes, size_t n)
+/* FNV-1a, of whole numbers. */
+static uint64_t mix(uint64_t hash, uint64_t value)
 {
-    for (size_t i = 0; i < n; i++)
-        hash = (hash ^ ((const unsigned char *)bytes)[i]) * 0x100000001b3ULL;
-    return hash;
+    return (hash ^ value) * 0x100000001b3ULL;
 }
 
 static uint64_t state_of_file(const char *path)
 {
     struct stat s = {0};
+    uint64_t hash = 0xcbf29ce484222325ULL;
     if (stat(path, &s) != 0)
         return 0;
-    const int64_t facts[] = {s.st_mtim.tv_sec, s.st_mtim.tv_nsec, s.st_size, (int64_t)s.st_ino};
-    return mix(mix(0xcbf29ce484222325ULL, path, strlen(path)), facts, sizeof facts);
+    for (const char *p = path; *p; p++)
+        hash = mix(hash, (unsigned char)*p);
+    hash = mix(mix(hash, (uint64_t)s.st_mtim.tv_sec), (uint64_t)s.st_mtim.tv_nsec);
+    return mix(mix(hash, (uint64_t)s.st_size), (uint64_t)s.st_ino);
 }
 
 static bool is_same(const char *a, const char *b)

@@ -174,6 +174,28 @@ static void test_tube_against_sums_along_it(void **state)
     assert_near(weft_light_tube_irradiance_soft(along, along, n), 1.0 / 5, 1e-15);
 }
 
+/* What an area light has to be (S-UE4-19): the point light when it is small, for both of its parts. */
+static void test_a_small_tube_is_a_point(void **state)
+{
+    (void)state;
+    uint64_t random = SEED;
+    const double n[3] = {0, 0, 1}, length = 1e-6;
+    for (int i = 0; i < 50; i++) {
+        const double at[3] = {between(&random, -2, 2), between(&random, -2, 2), between(&random, 1, 4)};
+        const double d2 = dot(at, at), d = sqrt(d2);
+        double axis[3], r[3], end[3];
+        weft_brdf_direction(between(&random, -1, 1), between(&random, 0, 7), axis);
+        weft_brdf_direction(between(&random, 0.2, 1), between(&random, 0, 7), r);
+        for (int c = 0; c < 3; c++)
+            end[c] = at[c] + length * axis[c];
+        const weft_light_tube tube = weft_light_tube_of(at, end, r, 0.2);
+        assert_near(dot(tube.point.l, at), d, length);
+        assert_near(tube.point.norm, 1, length);
+        assert_near(weft_light_tube_irradiance(at, end, n), at[2] / (d2 * d), 2 * length);
+        assert_near(weft_light_tube_irradiance_soft(at, end, n), at[2] / (d * (d2 + 1)), 2 * length);
+    }
+}
+
 /* Reflectance of everything above the cone by a plain sum over light directions. */
 static double cone_sum(double alpha, double nv, double cone)
 {
@@ -503,6 +525,7 @@ int main(void)
         cmocka_unit_test(test_falloff),
         cmocka_unit_test(test_sphere_takes_its_nearest_point),
         cmocka_unit_test(test_tube_against_sums_along_it),
+        cmocka_unit_test(test_a_small_tube_is_a_point),
         cmocka_unit_test(test_environment),
         cmocka_unit_test(test_prefilter),
         cmocka_unit_test(test_panorama),
