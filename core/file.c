@@ -174,6 +174,19 @@ weft_err weft_file_refuse_existing(const char *path, bool force, weft_error *err
     return WEFT_OK;
 }
 
+weft_err weft_file_require_parent(const char *path, weft_error *err)
+{
+    char *const parent = weft_path_folder(path, err);
+    if (!parent)
+        return WEFT_ERR_NOMEM;
+    const weft_err status =
+        weft_folder_exists(parent)
+            ? WEFT_OK
+            : weft_fail(err, WEFT_ERR_IO, "%s cannot be made: there is no folder %s", path, parent);
+    weft_free(parent);
+    return status;
+}
+
 /* A name beside `path` that no other process or thread has: ".weft-NAME-PID-N". */
 static weft_err make_names(weft_atomic *a, const char *path, weft_error *err)
 {

@@ -48,6 +48,9 @@ weft_err weft_file_read(const char *path, size_t limit, char **bytes, size_t *n,
 /** Says before any work is done that `path` would be overwritten: WEFT_ERR_EXISTS with the remedy. */
 weft_err weft_file_refuse_existing(const char *path, bool force, weft_error *err);
 
+/** Says before any work is done that the folder which `path` shall be in is not there: WEFT_ERR_IO. */
+weft_err weft_file_require_parent(const char *path, weft_error *err);
+
 /** Size in bytes of a regular file that can be opened for reading.
  *  @return WEFT_ERR_IO naming the path when it is absent, a folder or device, or not readable. */
 weft_err weft_file_size(const char *path, uint64_t *bytes, weft_error *err);

@@ -207,13 +207,30 @@ static weft_err check_maps(const weft_invocation *inv, const check_args *args, c
     return status;
 }
 
+/* What can be known to be wrong before minutes of work. */
+static weft_err check_arguments(const weft_invocation *inv, const check_args *args,
+                                const weft_calibration *cal, const weft_solve_options *options,
+                                weft_error *err)
+{
+    weft_set again;
+    if (args->map) {
+        WEFT_TRY(weft_file_refuse_existing(args->map, inv->force, err));
+        WEFT_TRY(weft_file_require_parent(args->map, err));
+    }
+    if (!args->repeat)
+        return WEFT_OK;
+    WEFT_TRY(weft_set_load(args->repeat, &again, err));
+    const weft_err status = weft_solve_check(&again, cal, args->calibration, options, err);
+    weft_set_fini(&again);
+    return status;
+}
+
 static weft_err check_set(const weft_invocation *inv, const check_args *args, const weft_set *set,
                           const weft_calibration *cal, weft_error *err)
 {
     weft_solve_options options = {.sensor_geometry = true, .height_mm = args->thickness_mm};
     WEFT_TRY(weft_solve_find_method(args->method, &options.method, err));
-    if (args->map)
-        WEFT_TRY(weft_file_refuse_existing(args->map, inv->force, err));
+    WEFT_TRY(check_arguments(inv, args, cal, &options, err));
     json_t *const report = json_pack("{s:s, s:s, s:s}", "set", set->folder, "calibration", args->calibration,
                                      "method", args->method);
     weft_err status = check_relight(inv, args, set, cal, &options, report, err);

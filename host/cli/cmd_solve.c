@@ -176,19 +176,6 @@ static weft_err output_path(const weft_invocation *inv, const solve_args *args, 
     return *path ? WEFT_OK : WEFT_ERR_NOMEM;
 }
 
-/* Known before minutes of work, not after. */
-static weft_err require_parent(const char *path, weft_error *err)
-{
-    char *const parent = weft_path_folder(path, err);
-    if (!parent)
-        return WEFT_ERR_NOMEM;
-    weft_err status = WEFT_OK;
-    if (!weft_folder_exists(parent))
-        status = weft_fail(err, WEFT_ERR_IO, "%s cannot be made: there is no folder %s", path, parent);
-    weft_free(parent);
-    return status;
-}
-
 /* Two sets of one name would write the same folder. */
 static weft_err refuse_same_names(const weft_invocation *inv, const solve_args *args, int i, const char *path,
                                   weft_error *err)
@@ -215,7 +202,7 @@ static weft_err check_all(const weft_invocation *inv, const solve_args *args, co
         WEFT_TRY(output_path(inv, args, i, &path, err));
         weft_err status = weft_file_refuse_existing(path, inv->force, err);
         if (status == WEFT_OK && inv->n_operands == 1)
-            status = require_parent(path, err);
+            status = weft_file_require_parent(path, err);
         if (status == WEFT_OK)
             status = refuse_same_names(inv, args, i, path, err);
         weft_free(path);
@@ -341,6 +328,8 @@ static weft_err run_with(const weft_invocation *inv, const solve_args *args, con
     if (needs_plane && options.sensor_geometry)
         return weft_fail(err, WEFT_ERR_USAGE, "%s is for maps of the plane, not for --geometry sensor",
                          needs_plane);
+    if (args->explain_plot && args->explain.n == 0)
+        return weft_fail(err, WEFT_ERR_USAGE, "--explain-plot needs the pixel: --explain X,Y");
     if (args->explain.n > 0 && inv->n_operands > 1)
         return weft_fail(err, WEFT_ERR_USAGE, "--explain is for one set");
     if (args->explain.n > 0)

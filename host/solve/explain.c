@@ -5,6 +5,7 @@
 #include "host/solve/cloth_gloss.h"
 #include "host/solve/light_plates.h"
 #include "host/solve/rectify.h"
+#include "host/solve/solve_mask.h"
 #include "host/solve/strip.h"
 
 #include <math.h>
@@ -37,10 +38,8 @@ static weft_err find_on_plane(const weft_calibration *cal, const weft_solve_opti
 {
     weft_plane_grid grid;
     double u, v;
-    e->mm_per_px = options->mm_per_px;
-    if (!(e->mm_per_px > 0))
-        WEFT_TRY(weft_plane_scale(&cal->camera, pixel, options->height_mm, &e->mm_per_px, err));
-    WEFT_TRY(weft_plane_grid_init(&grid, &cal->camera, e->mm_per_px, options->height_mm, err));
+    WEFT_TRY(weft_plane_grid_choose(&grid, &cal->camera, pixel, options->mm_per_px, options->height_mm, err));
+    e->mm_per_px = grid.mm_per_px;
     if (e->x < 0 || e->y < 0 || e->x >= grid.width || e->y >= grid.height)
         return outside(grid.width, grid.height, e, err);
     const weft_vec3 world = {(e->x - (grid.width - 1) / 2.0) * grid.mm_per_px,
@@ -271,47 +270,17 @@ static void explain_samples(const weft_solve_plan *plan, const weft_light_plates
 
 /* ---- the set around it ---- */
 
-/* What weft_solve_set() does about a white strip. */
-static weft_err follow_strip(const weft_set *set, const weft_light_plates *plates, weft_pixel_scale pixel,
-                             weft_calibration *cal, weft_error *err)
-{
-    weft_strip strip;
-    weft_strip_drift drift;
-    bool present;
-    WEFT_TRY(weft_strip_of_set(set, &strip, &present, err));
-    if (!present)
-        return WEFT_OK;
-    WEFT_TRY(weft_strip_measure(plates, pixel, cal, &strip, &drift, err));
-    for (int j = 0; j < plates->n; j++)
-        for (int c = 0; c < 3; c++)
-            cal->lights[j].intensity[c] *= drift.gain[j][c];
-    return WEFT_OK;
-}
-
-static weft_err look_at_mask(const weft_set *set, const weft_solve_options *options, weft_explanation *e,
-                             weft_error *err)
-{
-    weft_mask mask;
-    e->inside = true;
-    if (!set->mask_file)
-        return WEFT_OK;
-    WEFT_TRY(weft_set_load_mask(set, &mask, err));
-    const int step = options->half ? 2 : 1, u = e->column * step, v = e->row * step;
-    e->inside =
-        u < mask.width && v < mask.height && mask.data[(size_t)v * (size_t)mask.width + (size_t)u] != 0;
-    weft_mask_fini(&mask);
-    return WEFT_OK;
-}
-
 static weft_err explain_with(const weft_set *set, const weft_calibration *cal,
                              const weft_solve_options *options, weft_pixel_scale pixel,
-                             const weft_light_plates *plates, workspace *w, weft_explanation *e,
-                             weft_error *err)
+                             const weft_light_plates *plates, const weft_mask *inside, workspace *w,
+                             weft_explanation *e, weft_error *err)
 {
     weft_calibration drifted = *cal;
+    weft_strip_drift drift;
+    bool has_strip;
     weft_incidence incidence;
     weft_gloss_report report = {0};
-    WEFT_TRY(follow_strip(set, plates, pixel, &drifted, err));
+    WEFT_TRY(weft_strip_follow(set, plates, pixel, &drifted, &drift, &has_strip, err));
     WEFT_TRY(weft_incidence_init(&incidence, &drifted, plates->width, plates->height, pixel,
                                  options->height_mm, err));
     weft_solve_plan plan = {.incidence = &incidence,
@@ -321,7 +290,7 @@ static weft_err explain_with(const weft_set *set, const weft_calibration *cal,
                             .shadow = (float)options->shadow};
     weft_err status = WEFT_OK;
     if (plan.method->takes_gloss && !options->matte)
-        status = weft_cloth_gloss(&plan, plates, &(weft_mask){0}, &e->gloss, &report, err);
+        status = weft_cloth_gloss(&plan, plates, inside, &e->gloss, &report, err);
     if (status == WEFT_OK) {
         e->method = plan.method->name;
         e->glossy = report.found;
@@ -337,22 +306,29 @@ weft_err weft_solve_explain(const weft_set *set, const weft_calibration *cal, co
                             const weft_solve_options *options, int x, int y, weft_explanation *explanation,
                             weft_error *err)
 {
-    const weft_pixel_scale pixel = options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
+    const weft_pixel_scale pixel = weft_solve_pixel(options);
     weft_light_plates plates = {0};
     weft_explanation e = {.x = x, .y = y};
     WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
     WEFT_TRY(find_pixel(set, cal, options, pixel, &e, err));
-    WEFT_TRY(look_at_mask(set, options, &e, err));
+    weft_mask inside = {0};
+    weft_err status = weft_solve_load_mask(set, options->half, &inside, err);
+    if (status != WEFT_OK) {
+        weft_mask_fini(&inside);
+        return status;
+    }
+    e.inside = !inside.data || inside.data[(size_t)e.row * (size_t)inside.width + (size_t)e.column];
     workspace *const w = weft_alloc(1, sizeof *w, err);
     const weft_light_reading reading = options->half     ? WEFT_READ_HALF
                                        : options->linear ? WEFT_READ_LINEAR
                                                          : WEFT_READ_SITES;
-    weft_err status = w ? weft_light_plates_load(set, reading, &plates, err) : WEFT_ERR_NOMEM;
+    status = w ? weft_light_plates_load(set, reading, &plates, err) : WEFT_ERR_NOMEM;
     if (status == WEFT_OK) {
         weft_light_plates_know_noise(&plates, set, cal);
-        status = explain_with(set, cal, options, pixel, &plates, w, &e, err);
+        status = explain_with(set, cal, options, pixel, &plates, &inside, w, &e, err);
     }
     weft_light_plates_fini(&plates);
+    weft_mask_fini(&inside);
     weft_free(w);
     if (status == WEFT_OK)
         *explanation = e;

@@ -150,7 +150,7 @@ weft_err weft_maps_integrate(weft_maps *maps, weft_height_how how, weft_error *e
     if (note && how == WEFT_HEIGHT_POISSON)
         json_object_set_new(note, "misfit", json_real(info.misfit));
     if (result && note)
-        json_object_set(result, "height", note);
+        json_object_set(result, "height_map", note); /* "height" is the number of rows */
     json_decref(note);
     return WEFT_OK;
 }

@@ -59,14 +59,35 @@ weft_err weft_plane_grid_init(weft_plane_grid *grid, const weft_camera *camera, 
     const double columns = 2 * (floor(x_mm / mm_per_px - 0.5) + 1);
     const double rows = 2 * (floor(y_mm / mm_per_px - 0.5) + 1);
     const double side = fmax(columns, rows);
-    if (!(side <= WEFT_IMAGE_MAX_SIDE) || columns < 2 || rows < 2)
+    const bool too_fine = !(side <= WEFT_IMAGE_MAX_SIDE);
+    if (too_fine || columns < 2 || rows < 2)
         return weft_fail(err, WEFT_ERR_RANGE,
                          "a grid of %.6g mm a pixel over %.4g x %.4g mm has %.0f x %.0f pixels "
-                         "(use --mm-per-px between %.2g and %.2g)",
-                         mm_per_px, 2 * x_mm, 2 * y_mm, columns, rows,
-                         2.1 * fmax(x_mm, y_mm) / WEFT_IMAGE_MAX_SIDE, 0.9 * fmin(x_mm, y_mm));
+                         "(use --mm-per-px of %s %.2g)",
+                         mm_per_px, 2 * x_mm, 2 * y_mm, columns, rows, too_fine ? "at least" : "less than",
+                         too_fine ? 2.1 * fmax(x_mm, y_mm) / WEFT_IMAGE_MAX_SIDE : 0.9 * fmin(x_mm, y_mm));
     *grid = (weft_plane_grid){(int)columns, (int)rows, mm_per_px, height_mm};
     return WEFT_OK;
+}
+
+static weft_err refuse_coarse(double mm_per_px, double sensor_mm, weft_error *err)
+{
+    return mm_per_px <= COARSEST * sensor_mm
+               ? WEFT_OK
+               : weft_fail(err, WEFT_ERR_RANGE,
+                           "%.4g mm a pixel is more than %d times as coarse as the sensor (use at most %.3g)",
+                           mm_per_px, COARSEST, COARSEST * sensor_mm);
+}
+
+weft_err weft_plane_grid_choose(weft_plane_grid *grid, const weft_camera *camera, weft_pixel_scale pixel,
+                                double mm_per_px, double height_mm, weft_error *err)
+{
+    double sensor_mm;
+    WEFT_TRY(weft_plane_scale(camera, pixel, height_mm, &sensor_mm, err));
+    if (!(mm_per_px > 0))
+        mm_per_px = sensor_mm;
+    WEFT_TRY(refuse_coarse(mm_per_px, sensor_mm, err));
+    return weft_plane_grid_init(grid, camera, mm_per_px, height_mm, err);
 }
 
 /* Lanczos kernel of three lobes at distances 0, 1/256, ... 3 and one past the end. */
@@ -307,10 +328,7 @@ weft_err weft_rectify(const weft_maps *sensor, const weft_camera *camera, weft_p
     double sensor_mm;
     WEFT_TRY(weft_plane_scale(camera, pixel, grid->height_mm, &sensor_mm, err));
     rectify_job job = {sensor, camera, pixel, grid, plane, {{0}}, fmax(1, grid->mm_per_px / sensor_mm)};
-    if (job.widen > COARSEST)
-        return weft_fail(err, WEFT_ERR_RANGE,
-                         "%.4g mm a pixel is more than %d times as coarse as the sensor (use at most %.3g)",
-                         grid->mm_per_px, COARSEST, COARSEST * sensor_mm);
+    WEFT_TRY(refuse_coarse(grid->mm_per_px, sensor_mm, err));
     if (sensor->width < 2 || sensor->height < 2)
         return weft_fail(err, WEFT_ERR_RANGE, "%d x %d pixels are too few to resample", sensor->width,
                          sensor->height);

@@ -23,6 +23,11 @@ weft_err weft_plane_scale(const weft_camera *camera, weft_pixel_scale pixel, dou
 weft_err weft_plane_grid_init(weft_plane_grid *grid, const weft_camera *camera, double mm_per_px,
                               double height_mm, weft_error *err);
 
+/** The grid of a wish: `mm_per_px` 0 takes the sensor's scale.
+ *  @return what the two above say; WEFT_ERR_RANGE for more than 16 times as coarse as the sensor */
+weft_err weft_plane_grid_choose(weft_plane_grid *grid, const weft_camera *camera, weft_pixel_scale pixel,
+                                double mm_per_px, double height_mm, weft_error *err);
+
 /**
  * Resamples maps in sensor geometry to the grid.
  *

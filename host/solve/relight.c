@@ -173,7 +173,7 @@ void weft_relight_fini(weft_relight *relight)
 weft_err weft_relight_set(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
                           const weft_solve_options *options, weft_relight *relight, weft_error *err)
 {
-    const weft_pixel_scale pixel = options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
+    const weft_pixel_scale pixel = weft_solve_pixel(options);
     weft_light_plates plates = {0};
     weft_incidence incidence = {0};
     weft_mask inside = {0};

@@ -12,6 +12,7 @@
 #include "host/solve/refuse.h"
 #include "host/solve/seams.h"
 #include "host/solve/site_albedo.h"
+#include "host/solve/solve_mask.h"
 #include "host/solve/solve_row.h"
 
 #include <math.h>
@@ -58,6 +59,11 @@ static weft_err require_memory(const weft_set *set, const weft_solve_options *op
                      options->memory_bytes / 1073741824.0, ceil(needed / 10737418.24) / 100);
 }
 
+static bool goes_to_plane(const weft_calibration *cal, const weft_solve_options *options)
+{
+    return cal->has_camera && cal->camera.has_pose && !options->sensor_geometry;
+}
+
 weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
                           const weft_solve_options *options, weft_error *err)
 {
@@ -74,6 +80,9 @@ weft_err weft_solve_check(const weft_set *set, const weft_calibration *cal, cons
                          set->folder, n, cal_folder, cal->n_lights);
     if (cal->has_camera)
         WEFT_TRY(weft_calibration_require_size(cal, set->width, set->height, cal_folder, err));
+    if (goes_to_plane(cal, options))
+        WEFT_TRY(weft_plane_grid_choose(&(weft_plane_grid){0}, &cal->camera, weft_solve_pixel(options),
+                                        options->mm_per_px, options->height_mm, err));
     WEFT_TRY(require_memory(set, options, err));
     return weft_refuse_cone(cal, cal_folder, options->height_mm, err);
 }
@@ -180,34 +189,7 @@ static weft_err solve_all_rows(solve_job *job, const weft_solve_options *options
     return WEFT_OK;
 }
 
-/* ---- masks and maps ---- */
-
-/* A cell is inside when its four sites are. */
-static weft_err halve_mask(weft_mask *mask, weft_error *err)
-{
-    weft_mask half;
-    WEFT_TRY(weft_mask_init(&half, mask->width / 2, mask->height / 2, 0, err));
-    for (int j = 0; j < half.height; j++)
-        for (int i = 0; i < half.width; i++) {
-            const uint8_t *const a = mask->data + (size_t)(2 * j) * (size_t)mask->width + (size_t)(2 * i);
-            const uint8_t *const b = a + mask->width;
-            half.data[(size_t)j * (size_t)half.width + (size_t)i] = a[0] && a[1] && b[0] && b[1] ? 255 : 0;
-        }
-    weft_mask_fini(mask);
-    *mask = half;
-    return WEFT_OK;
-}
-
-static weft_err load_mask(const weft_set *set, bool half, weft_mask *mask, weft_error *err)
-{
-    if (!set->mask_file)
-        return WEFT_OK;
-    WEFT_TRY(weft_set_load_mask(set, mask, err));
-    if (mask->width != set->width || mask->height != set->height)
-        return weft_fail(err, WEFT_ERR_MISMATCH, "%s/%s has %d x %d pixels, the set has %d x %d", set->folder,
-                         set->mask_file, mask->width, mask->height, set->width, set->height);
-    return half ? halve_mask(mask, err) : WEFT_OK;
-}
+/* ---- maps ---- */
 
 static weft_err make_maps(weft_maps *maps, int width, int height, weft_error *err)
 {
@@ -239,19 +221,13 @@ static void explain_gloss(const weft_gloss_report *report, const weft_gloss *glo
 static weft_err follow_drift(const weft_set *set, const weft_light_plates *plates, weft_pixel_scale pixel,
                              weft_calibration *cal, weft_solve_run *run, weft_error *err)
 {
-    weft_strip strip;
     bool present;
     double least = 1, most = 1;
-    WEFT_TRY(weft_strip_of_set(set, &strip, &present, err));
+    WEFT_TRY(weft_strip_follow(set, plates, pixel, cal, &run->drift, &present, err));
     if (!present)
         return WEFT_OK;
-    if (has_near_light(cal) && !cal->camera.has_pose)
-        return weft_fail(err, WEFT_ERR_MISSING, "the white strip needs the camera's pose");
-    WEFT_TRY(weft_strip_measure(plates, pixel, cal, &strip, &run->drift, err));
     run->n_drift = plates->n;
     for (int j = 0; j < plates->n; j++) {
-        for (int c = 0; c < 3; c++)
-            cal->lights[j].intensity[c] *= run->drift.gain[j][c];
         least = fmin(least, run->drift.gain[j][1]);
         most = fmax(most, run->drift.gain[j][1]);
     }
@@ -283,7 +259,7 @@ static weft_err solve_on_sensor(const weft_set *set, const weft_calibration *cal
     weft_incidence incidence = {0};
     weft_calibration drifted = *cal; /* its numbers; what it points to stays cal's */
     double clock = weft_clock_s();
-    weft_err status = load_mask(set, options->half, &inside, err);
+    weft_err status = weft_solve_load_mask(set, options->half, &inside, err);
     if (status == WEFT_OK)
         status = weft_light_plates_load(set,
                                         options->half     ? WEFT_READ_HALF
@@ -331,10 +307,7 @@ static weft_err put_on_plane(weft_maps *maps, const weft_calibration *cal, const
 {
     weft_plane_grid grid;
     weft_maps plane = {0};
-    double mm_per_px = options->mm_per_px;
-    if (!(mm_per_px > 0))
-        WEFT_TRY(weft_plane_scale(&cal->camera, pixel, options->height_mm, &mm_per_px, err));
-    WEFT_TRY(weft_plane_grid_init(&grid, &cal->camera, mm_per_px, options->height_mm, err));
+    WEFT_TRY(weft_plane_grid_choose(&grid, &cal->camera, pixel, options->mm_per_px, options->height_mm, err));
     WEFT_TRY(weft_rectify(maps, &cal->camera, pixel, &grid, &plane, err));
     weft_maps_fini(maps);
     *maps = plane;
@@ -344,15 +317,15 @@ static weft_err put_on_plane(weft_maps *maps, const weft_calibration *cal, const
 weft_err weft_solve_set(const weft_set *set, const weft_calibration *cal, const char *cal_folder,
                         const weft_solve_options *options, weft_maps *maps, weft_error *err)
 {
-    const weft_pixel_scale pixel = options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
+    const weft_pixel_scale pixel = weft_solve_pixel(options);
     weft_solve_run run = {0};
     weft_maps to = {0};
     WEFT_TRY(weft_solve_check(set, cal, cal_folder, options, err));
-    const bool pose = cal->has_camera && cal->camera.has_pose;
-    if (!pose && !options->sensor_geometry)
+    const bool to_plane = goes_to_plane(cal, options);
+    if (!to_plane && !options->sensor_geometry)
         weft_note("%s has no camera: the maps stay in sensor geometry", cal_folder);
     weft_err status = solve_on_sensor(set, cal, options, pixel, &to, &run, err);
-    if (status == WEFT_OK && pose && !options->sensor_geometry) {
+    if (status == WEFT_OK && to_plane) {
         const double clock = weft_clock_s();
         status = put_on_plane(&to, cal, options, pixel, err);
         run.seconds.rectify = weft_clock_s() - clock;

@@ -6,6 +6,7 @@
 
 #include "host/set/maps.h"
 #include "host/set/set.h"
+#include "host/solve/incidence.h"
 #include "host/solve/samples.h"
 
 typedef struct weft_solve_options {
@@ -22,13 +23,19 @@ typedef struct weft_solve_options {
     double shadow; /* samples below this part of the pixel's brightest are left out; 0: no such rule */
 } weft_solve_options;
 
+/** Where the pixels that are solved lie on the sensor. */
+static inline weft_pixel_scale weft_solve_pixel(const weft_solve_options *options)
+{
+    return options->half ? (weft_pixel_scale){2, 0.5} : (weft_pixel_scale){1, 0};
+}
+
 /** The method of a name; WEFT_ERR_USAGE lists what there is. */
 weft_err weft_solve_find_method(const char *name, const weft_solve_method **method, weft_error *err);
 
 /**
  * Says whether a set can be solved with a calibration, before anything large is read: the set is complete,
  * the calibration has lights (near ones: and a camera with its pose), as many as the set, and is for
- * frames of this size.
+ * frames of this size, and the plane can be had at the scale asked for.
  *
  * @param cal_folder  only for the messages
  */

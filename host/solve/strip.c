@@ -189,3 +189,17 @@ weft_err weft_strip_measure(const weft_light_plates *plates, weft_pixel_scale pi
     weft_free(w.ratios);
     return status;
 }
+
+weft_err weft_strip_follow(const weft_set *set, const weft_light_plates *plates, weft_pixel_scale pixel,
+                           weft_calibration *cal, weft_strip_drift *drift, bool *present, weft_error *err)
+{
+    weft_strip strip;
+    WEFT_TRY(weft_strip_of_set(set, &strip, present, err));
+    if (!*present)
+        return WEFT_OK;
+    WEFT_TRY(weft_strip_measure(plates, pixel, cal, &strip, drift, err));
+    for (int j = 0; j < plates->n; j++)
+        for (int c = 0; c < 3; c++)
+            cal->lights[j].intensity[c] *= drift->gain[j][c];
+    return WEFT_OK;
+}

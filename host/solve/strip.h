@@ -42,4 +42,12 @@ weft_err weft_strip_measure(const weft_light_plates *plates, weft_pixel_scale pi
                             const weft_calibration *cal, const weft_strip *strip, weft_strip_drift *drift,
                             weft_error *err);
 
+/**
+ * Takes the lamps' drift since the calibration into the lights of `cal`, where the set has a strip.
+ *
+ * @param present  false: it has none, and `cal` and `drift` stay as they are
+ */
+weft_err weft_strip_follow(const weft_set *set, const weft_light_plates *plates, weft_pixel_scale pixel,
+                           weft_calibration *cal, weft_strip_drift *drift, bool *present, weft_error *err);
+
 #endif

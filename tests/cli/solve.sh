@@ -50,6 +50,10 @@ test ! -e twice
 expect 0 'each light from the others, 768 px' "$weft" check flat.set -c flat.cal --flat --map error.exr
 expect 0 'repeated scan    normal mean 0.0000' "$weft" check flat.set -c flat.cal --repeat other.set
 expect 1 'error.exr' "$weft" check flat.set -c flat.cal --map error.exr
+# before anything is solved
+expect 1 'no folder absent' "$weft" check flat.set -c flat.cal --map absent/error.exr
+expect 1 'absent.set' "$weft" check flat.set -c flat.cal --repeat absent.set
+! grep -q 'each light' out
 "$weft" check flat.set -c flat.cal --flat --json | python3 -c '
 import json, sys
 d = json.load(sys.stdin)
@@ -94,6 +98,8 @@ expect 1 'pixel.svg' "$weft" solve flat.set -c flat.cal --explain 16,12 --explai
     '.n_used == 5 and (.lights | length) == 5 and .lights[2].used and .normal[2] > 0.9999 and .colour == -1' >/dev/null
 python3 -c 'import xml.dom.minidom; xml.dom.minidom.parse("pixel.svg")'
 expect 1 'the maps are 32 x 24' "$weft" solve flat.set -c flat.cal --explain 32,0
+expect 2 '--explain X,Y' "$weft" solve flat.set -c flat.cal -o plot.maps --explain-plot plot.svg
+test ! -e plot.maps
 expect 2 'column and row' "$weft" solve flat.set -c flat.cal --explain 3
 expect 2 'column and row' "$weft" solve flat.set -c flat.cal --explain 3.5,2
 expect 2 '--output is missing' "$weft" solve flat.set -c flat.cal

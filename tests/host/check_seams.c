@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { SIDE = 9, MIDDLE = 4, FINE = 32 };
+enum { SIDE = 9, MIDDLE = 4, FINE = 16 };
 
 static const double degrees = 57.29577951308232;
 
@@ -68,8 +68,8 @@ static double measured_over_stated(double albedo, double apart)
     double measured2 = 0, stated2 = 0;
     weft_maps m;
     make_maps(&m);
-    for (int i = 0; i < 400; i++) {
-        const double at = MIDDLE - 3 + 6 * (i + 0.5) / 400, angle = 2.39996 * i;
+    for (int i = 0; i < 150; i++) {
+        const double at = MIDDLE - 3 + 6 * (i + 0.5) / 150, angle = 2.39996 * i;
         double error = 0;
         for (int v = MIDDLE - 1; v <= MIDDLE + 1; v++)
             for (int u = MIDDLE - 1; u <= MIDDLE + 1; u++) {
