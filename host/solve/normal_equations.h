@@ -332,7 +332,7 @@ WEFT_INLINE void weft_lane_weigh(const weft_solve_samples *s, float misfit, weft
             const float grey = weights[j].at[k] * s->at[j].grey[k];
             peak[k] = grey > peak[k] ? grey : peak[k];
         }
-    for (int j = 0; j < s->n_lights; j++)
+    for (int j = 0; j < s->n_lights; j++) {
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++) {
             const float used = weights[j].at[k], tolerance = misfit * peak[k];
@@ -342,13 +342,15 @@ WEFT_INLINE void weft_lane_weigh(const weft_solve_samples *s, float misfit, weft
             sum[k] += w;
             n[k] += used;
         }
+    }
 #pragma omp simd
     for (int k = 0; k < WEFT_LANES; k++)
         sum[k] = n[k] > 0 ? n[k] / sum[k] : 1.0F;
-    for (int j = 0; j < s->n_lights; j++)
+    for (int j = 0; j < s->n_lights; j++) {
 #pragma omp simd
         for (int k = 0; k < WEFT_LANES; k++)
             weights[j].at[k] *= sum[k];
+    }
 }
 
 #endif
