@@ -48,8 +48,8 @@ for tries in 1 2 3 4 5 6 7 8; do
 done
 grep -q '^on' on.out || die "the lights do not go on: $(cat on.out)"
 expect 1 "another program is using this port: weft (process $holder)" "$weft" flash --port "$pty"
-kill $holder
-wait $holder 2>/dev/null
+kill "$holder"
+wait "$holder" 2>/dev/null
 
 # What it needs is not there, or not what it should be.
 expect 1 'sudo apt install avrdude' env PATH=/nonexistent "$weft" flash --port "$pty"

@@ -4,6 +4,7 @@ set -u
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 elf=$WEFT_TEST_BUILD/firmware/weft-firmware.elf
 most=$(sed -n 's/^#define FW_STACK_BYTES \(.*\)/\1/p' "$WEFT_TEST_SOURCE/firmware/fw_config.h")
+# shellcheck disable=SC2317 # by expect
 bound() { python3 "$WEFT_TEST_SOURCE/tests/firmware/stack_bound.py" "$@"; }
 expect 0 'stack: ' bound "$elf" --table commands:5:3 --quiet 0x6f,0x70 --most "$most" # TIMSK1 and TIMSK2
 cat out

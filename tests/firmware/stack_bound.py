@@ -54,7 +54,8 @@ class Program:
         data = image[start - data_begin:start - data_begin + n]
         if len(data) < n or n % int(size):
             raise Refused(f"the table {name} cannot be read")
-        entries = [2 * int.from_bytes(data[i + int(offset):i + int(offset) + 2], "little") for i in range(0, n, int(size))]
+        places = range(int(offset), n, int(size))
+        entries = [2 * int.from_bytes(data[i:i + 2], "little") for i in places]  # words to bytes
         for entry in entries:
             if entry not in self.label:
                 raise Refused(f"the table {name} holds 0x{entry:x}, where no function begins")
@@ -179,7 +180,7 @@ class Program:
     def lets_others_in(self, vector, quiet):
         """Whether an interrupt says sei; and that each time it has cleared the `quiet` registers just before."""
         reached = self.reached(vector)
-        targets = {self.code[at][2] for at in self.code if self.code[at][0] in ("jmp", "rjmp") or BRANCH.match(self.code[at][0])}
+        targets = {to for name, _, to in self.code.values() if name in ("jmp", "rjmp") or BRANCH.match(name)}
         opened = [at for at in reached if self.code[at][0] == "sei"]
         for sei in opened:
             at, missing = sei, set(quiet)
@@ -191,7 +192,8 @@ class Program:
                 if name == "sts" and args[1] == "r1":
                     missing.discard(int(args[0], 16))
             if missing:
-                raise Refused(f"{self.place(sei)}: lets in others like it: {', '.join(f'0x{m:x}' for m in sorted(missing))}")
+                left = ", ".join(f"0x{m:x}" for m in sorted(missing))
+                raise Refused(f"{self.place(sei)}: lets in others like it: {left}")
         return bool(opened)
 
     def vectors(self):
