@@ -1,10 +1,10 @@
 #include "shading/bake/mips.h"
 
-#include "core/clones.h"
 #include "core/mem.h"
 #include "core/parallel.h"
 #include "shading/bake/gloss.h"
 #include "shading/bake/mip_closest.h"
+#include "shading/bake/mip_sums.h"
 #include "shading/bake/normal_filter.h"
 #include "shading/bake/vmf.h"
 
@@ -23,12 +23,7 @@ weft_mip_options weft_mip_defaults(void)
 
 /* -- one footprint ------------------------------------------------------------------------------------ */
 
-/* What a footprint is, summed: enough for every rule but the closest. */
-typedef struct footprint {
-    double weight, mean[3], shortened[3], alpha, alpha2;
-} footprint;
-
-static void gather(footprint *f, const double n[3], double alpha, double weight, weft_mip_rule rule)
+static void gather(weft_mip_footprint *f, const double n[3], double alpha, double weight, weft_mip_rule rule)
 {
     const double length = rule == WEFT_MIP_LENGTH ? 1 - weft_ggx_missing_length(alpha) : 0;
     f->weight += weight;
@@ -58,7 +53,7 @@ static double alpha_of_missing(double missing)
     return high;
 }
 
-static double by_sums(weft_mip_rule rule, const footprint *f)
+static double by_sums(weft_mip_rule rule, const weft_mip_footprint *f)
 {
     const double r = fmin(norm(f->mean) / f->weight, 1), alpha2 = f->alpha2 / f->weight;
     switch (rule) {
@@ -90,7 +85,7 @@ static inline float slope2(const float n[3], const double mean[3])
 double weft_mip_roughness(weft_mip_rule rule, int n, const float (*normals)[3], const float *weights,
                           const float *alphas)
 {
-    footprint f = {0};
+    weft_mip_footprint f = {0};
     for (int i = 0; i < n; i++) {
         const double v[3] = {(double)normals[i][0], (double)normals[i][1], (double)normals[i][2]};
         gather(&f, v, (double)alphas[i], (double)weights[i], rule);
@@ -119,30 +114,9 @@ typedef struct level_job {
     weft_mip_rule rule;
     int level;
     float *scratch;          /* per band: [3][MAX_TEXELS] */
-    double *sums;            /* per band: [SUMS][w0] */
+    double *sums;            /* per band: [WEFT_MIP_SUMS][w0] */
     const float *anisotropy; /* [w0] the constant, for where there is no map */
 } level_job;
-
-/* The texels of level 0 that a texel of a level covers, [begin, end), with the shares of the first and last.
- */
-typedef struct extent {
-    int begin, end;
-    double first, last;
-} extent;
-
-static extent extent_of(int i, int n, int n0)
-{
-    const double from = (double)i * n0 / n, to = (double)(i + 1) * n0 / n;
-    extent e = {(int)floor(from), (int)ceil(to - 1e-9), 1, 1};
-    e.first = fmin(e.begin + 1, to) - from;
-    e.last = e.end - e.begin > 1 ? to - (e.end - 1) : e.first;
-    return e;
-}
-
-static inline double share(const extent *e, int i)
-{
-    return i == e->begin ? e->first : i == e->end - 1 ? e->last : 1;
-}
 
 static double alpha_at(const weft_baked *b, int x, int y)
 {
@@ -156,8 +130,8 @@ static double anisotropy_at(const weft_baked *b, int x, int y)
     return (double)(map->n_mips > 0 ? weft_image_row(&map->mips[0], 0, y)[x] : map->constant[0]);
 }
 
-static double closest_of(const level_job *job, const extent *ex, const extent *ey, const double mean[3],
-                         float *scratch)
+static double closest_of(const level_job *job, const weft_mip_extent *ex, const weft_mip_extent *ey,
+                         const double mean[3], float *scratch)
 {
     const weft_image *const normal = &job->baked->maps[WEFT_BAKED_NORMAL].mips[0];
     const int step_x = (ex->end - ex->begin + MAX_SIDE - 1) / MAX_SIDE;
@@ -171,97 +145,13 @@ static double closest_of(const level_job *job, const extent *ex, const extent *e
             const double alpha = alpha_at(job->baked, x, y);
             d2[n] = slope2(v, mean);
             a2[n] = (float)(alpha * alpha * (1 - anisotropy_at(job->baked, x, y)));
-            w[n] = (float)(share(ex, x) * share(ey, y));
+            w[n] = (float)(weft_mip_share(ex, x) * weft_mip_share(ey, y));
         }
     return weft_mip_closest(n, d2, a2, w);
 }
 
-/* Sums over the rows of level 0 that a row of the level covers, for each column of level 0. */
-enum { SUM_NORMAL = 0, SUM_ALPHA = 3, SUM_ALPHA2 = 4, SUM_SHORTENED = 5, SUMS = 8 };
-
-WEFT_CLONES
-static void add_scaled(double *sum, const float *values, double weight, int n)
-{
-    WEFT_INDEPENDENT
-    for (int u = 0; u < n; u++)
-        sum[u] += weight * (double)values[u];
-}
-
-/* With anisotropy, the widths of both axes in one number; put apart again in store_lobe(). */
-WEFT_CLONES
-static void add_widths(double *sum, double *squares, const float *along, const float *anisotropy,
-                       double weight, int n)
-{
-    WEFT_INDEPENDENT
-    for (int u = 0; u < n; u++) {
-        const double alpha = (double)along[u] * sqrt(1 - (double)anisotropy[u]);
-        sum[u] += weight * alpha;
-        squares[u] += weight * alpha * alpha;
-    }
-}
-
-/* Normals as long as the mean of their GGX; neighbours are mostly of one alpha. */
-static void add_shortened(double *sum, int n, const float *const normal[3], const float *along,
-                          const float *anisotropy, double weight)
-{
-    double last = -1, length = 0;
-    for (int u = 0; u < n; u++) {
-        const double alpha = (double)along[u] * sqrt(1 - (double)anisotropy[u]);
-        if (alpha != last)
-            length = 1 - weft_ggx_missing_length(alpha);
-        last = alpha;
-        for (int c = 0; c < 3; c++)
-            sum[(size_t)c * (size_t)n + (size_t)u] += weight * length * (double)normal[c][u];
-    }
-}
-
-/* @param sums        [SUMS][w0], overwritten
- * @param anisotropy  [w0] that of a material without a map */
-static void sum_rows(const level_job *job, const extent *ey, const float *anisotropy, double *sums)
-{
-    const weft_baked_map *const maps = job->baked->maps;
-    const int w = job->baked->width;
-    const size_t n = (size_t)w;
-    memset(sums, 0, SUMS * n * sizeof *sums);
-    for (int y = ey->begin; y < ey->end; y++) {
-        const double weight = share(ey, y);
-        const float *const along = weft_image_row(&maps[WEFT_BAKED_ROUGHNESS].mips[0], 0, y);
-        const weft_baked_map *const s = &maps[WEFT_BAKED_ANISOTROPY];
-        const float *const turned = s->n_mips > 0 ? weft_image_row(&s->mips[0], 0, y) : anisotropy;
-        const float *normal[3];
-        for (int c = 0; c < 3; c++) {
-            normal[c] = weft_image_row(&maps[WEFT_BAKED_NORMAL].mips[0], c, y);
-            add_scaled(sums + (size_t)c * n, normal[c], weight, w);
-        }
-        add_widths(sums + SUM_ALPHA * n, sums + SUM_ALPHA2 * n, along, turned, weight, w);
-        if (job->rule == WEFT_MIP_LENGTH)
-            add_shortened(sums + SUM_SHORTENED * n, w, normal, along, turned, weight);
-    }
-}
-
-/* Of the columns that a texel covers. */
-static footprint sum_columns(const level_job *job, const extent *ex, double rows, const double *sums)
-{
-    const size_t n = (size_t)job->baked->width;
-    footprint f = {0};
-    double *const to[SUMS] = {&f.mean[0], &f.mean[1],      &f.mean[2],      &f.alpha,
-                              &f.alpha2,  &f.shortened[0], &f.shortened[1], &f.shortened[2]};
-    const int planes = job->rule == WEFT_MIP_LENGTH ? SUMS : SUM_SHORTENED;
-    for (int k = 0; k < planes; k++) {
-        const double *const plane = sums + (size_t)k * n;
-        double sum = ex->first * plane[ex->begin];
-        for (int u = ex->begin + 1; u < ex->end - 1; u++)
-            sum += plane[u];
-        if (ex->end - ex->begin > 1)
-            sum += ex->last * plane[ex->end - 1];
-        *to[k] = sum;
-    }
-    f.weight = rows * (ex->end - ex->begin > 1 ? ex->end - ex->begin - 2 + ex->first + ex->last : ex->first);
-    return f;
-}
-
 /* What the normals add is added to both axes: alpha_t^2 + more, alpha_b^2 + more. */
-static void store_lobe(const level_job *job, int x, int y, double alpha, const footprint *f)
+static void store_lobe(const level_job *job, int x, int y, double alpha, const weft_mip_footprint *f)
 {
     weft_baked_map *const maps = job->baked->maps;
     weft_baked_map *const s = &maps[WEFT_BAKED_ANISOTROPY];
@@ -284,15 +174,15 @@ static void normal_rows(void *context, int band, int begin, int end)
     const level_job *const job = context;
     weft_baked_map *const maps = job->baked->maps;
     weft_image *const normal = &maps[WEFT_BAKED_NORMAL].mips[job->level];
+    const bool shortened = job->rule == WEFT_MIP_LENGTH;
     float *const scratch = job->scratch + (size_t)band * 3 * MAX_TEXELS;
-    double *const sums = job->sums + (size_t)band * SUMS * (size_t)job->baked->width;
+    double *const sums = job->sums + (size_t)band * WEFT_MIP_SUMS * (size_t)job->baked->width;
     for (int y = begin; y < end; y++) {
-        const extent ey = extent_of(y, normal->height, job->baked->height);
-        const double rows = ey.end - ey.begin > 1 ? ey.end - ey.begin - 2 + ey.first + ey.last : ey.first;
-        sum_rows(job, &ey, job->anisotropy, sums);
+        const weft_mip_extent ey = weft_mip_extent_of(y, normal->height, job->baked->height);
+        weft_mip_sum_rows(job->baked, &ey, job->anisotropy, shortened, sums);
         for (int x = 0; x < normal->width; x++) {
-            const extent ex = extent_of(x, normal->width, job->baked->width);
-            const footprint f = sum_columns(job, &ex, rows, sums);
+            const weft_mip_extent ex = weft_mip_extent_of(x, normal->width, job->baked->width);
+            const weft_mip_footprint f = weft_mip_sum_columns(&ey, &ex, shortened, job->baked->width, sums);
             const double length = norm(f.mean);
             double mean[3] = {0, 0, 1};
             for (int c = 0; c < 3; c++) {
@@ -321,13 +211,13 @@ static void mean_rows(void *context, int band, int begin, int end)
     (void)band;
     for (int p = 0; p < job->to->planes; p++)
         for (int y = begin; y < end; y++) {
-            const extent ey = extent_of(y, job->to->height, job->from->height);
+            const weft_mip_extent ey = weft_mip_extent_of(y, job->to->height, job->from->height);
             for (int x = 0; x < job->to->width; x++) {
-                const extent ex = extent_of(x, job->to->width, job->from->width);
+                const weft_mip_extent ex = weft_mip_extent_of(x, job->to->width, job->from->width);
                 double sum = 0, weight = 0;
                 for (int v = ey.begin; v < ey.end; v++)
                     for (int u = ex.begin; u < ex.end; u++) {
-                        const double w = share(&ex, u) * share(&ey, v);
+                        const double w = weft_mip_share(&ex, u) * weft_mip_share(&ey, v);
                         sum += w * (double)weft_image_row(job->from, p, v)[u];
                         weight += w;
                     }
@@ -434,7 +324,7 @@ static weft_err init_scratch(filter_scratch *s, const weft_baked *baked, weft_er
     if (s->texels)
         s->anisotropy = weft_alloc(width, sizeof *s->anisotropy, err);
     if (s->anisotropy)
-        s->sums = weft_alloc(bands * SUMS * width, sizeof *s->sums, err);
+        s->sums = weft_alloc(bands * WEFT_MIP_SUMS * width, sizeof *s->sums, err);
     for (size_t i = 0; s->sums && i < width; i++)
         s->anisotropy[i] = baked->maps[WEFT_BAKED_ANISOTROPY].constant[0];
     if (s->sums)
