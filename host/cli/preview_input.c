@@ -150,6 +150,10 @@ static weft_err load_material(weft_preview_input *input, const char *folder, con
     if (input->baked.two_lobes && strcmp(input->surface.brdf->name, weft_baked_brdf(&input->baked)) != 0)
         weft_warn("%s: GGX and cloth lie side by side; --brdf %s shows both, %s the smooth part alone",
                   folder, weft_baked_brdf(&input->baked), input->surface.brdf->name);
+    if (weft_brdf_find_param(input->surface.brdf, "roughness", NULL))
+        weft_warn("%s: %s takes the root of alpha and not the material's roughness map; give it by --param "
+                  "roughness",
+                  folder, input->surface.brdf->name);
     weft_brdf_defaults(input->surface.brdf, input->surface.params);
     return use_level(input, 0, err);
 }

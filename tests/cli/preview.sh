@@ -41,6 +41,7 @@ for size in '[-5, 3]' '[1e300, 1]'; do
 done
 cmp cloth-trilinear.png cloth-anisotropic.png
 refuse cmp cloth-samples.png cloth-anisotropic.png
+expect 0 "unreal takes the root of alpha" "$weft" preview cloth.material -o root.png --brdf unreal --size 8x8
 
 expect 0 'sheet.png: 672 x ' "$weft" contact weave.maps sensor.maps -o sheet.png --tile 120x80
 
