@@ -53,7 +53,7 @@ expect 1 'error.exr' "$weft" check flat.set -c flat.cal --map error.exr
 # before anything is solved
 expect 1 'no folder absent' "$weft" check flat.set -c flat.cal --map absent/error.exr
 expect 1 'absent.set' "$weft" check flat.set -c flat.cal --repeat absent.set
-! grep -q 'each light' out
+refuse grep 'each light' out
 "$weft" check flat.set -c flat.cal --flat --json | python3 -c '
 import json, sys
 d = json.load(sys.stdin)
