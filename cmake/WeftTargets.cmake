@@ -27,7 +27,7 @@ function(weft_library name)
 endfunction()
 
 # weft_test(check_NAME [SOURCES more.c] [LIBS x y] [TIMEOUT s] [SERIAL]): a cmocka program from check_NAME.c in this folder.
-# Exit status 77 is "skipped"; the program says why.  SERIAL: uses the virtual scanner's devices alone.
+# Exit status 77 is "skipped"; the program says why.  SERIAL: uses the virtual scanner's or its board's devices alone.
 function(weft_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${name}.c ${ARG_SOURCES})
