@@ -4,12 +4,10 @@
 #include "core/log.h"
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/unix_socket.h"
 
 #include <poll.h>
 #include <stdio.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 /* From fork() to the socket. */
@@ -21,16 +19,10 @@
 /* A connection that stays open as long as the scanner lives; -1: nobody holds the socket. */
 static int dial(const char *folder)
 {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (snprintf(address.sun_path, sizeof address.sun_path, "%s/control.sock", folder) >=
-        (int)sizeof address.sun_path)
+    char path[108]; /* as long as that of a socket can be */
+    if (snprintf(path, sizeof path, "%s/control.sock", folder) >= (int)sizeof path)
         return -1;
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) == 0)
-        return fd;
-    if (fd >= 0)
-        close(fd);
-    return -1;
+    return weft_unix_socket_connect(path);
 }
 
 /* Lets a slice pass; false when the scanner has ended meanwhile. */

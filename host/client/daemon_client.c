@@ -3,6 +3,7 @@
 #include "core/mem.h"
 #include "core/progress.h"
 #include "core/text.h"
+#include "core/unix_socket.h"
 #include "host/client/daemon_socket.h"
 
 #include <errno.h>
@@ -11,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 /* A daemon that writes to a slow disk is given so long. */
@@ -19,22 +19,6 @@
 /* For a daemon that was named and is just starting, or starting again. */
 #define START_S     1.0
 #define REPLY_LIMIT ((size_t)64 << 20)
-
-static int dial(const char *path)
-{
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof address.sun_path)
-        return -1;
-    snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) == 0)
-        return fd;
-    const int reason = errno;
-    if (fd >= 0)
-        close(fd);
-    errno = reason;
-    return -1;
-}
 
 weft_err weft_daemon_find(char path[108], bool *found, weft_error *err)
 {
@@ -49,10 +33,10 @@ weft_err weft_daemon_find(char path[108], bool *found, weft_error *err)
     else
         weft_daemon_default_socket(path);
     const double begin_s = weft_clock_s();
-    int fd = dial(path);
+    int fd = weft_unix_socket_connect(path);
     while (fd < 0 && named && weft_clock_s() - begin_s < START_S) {
         usleep(50000);
-        fd = dial(path);
+        fd = weft_unix_socket_connect(path);
     }
     if (fd < 0 && named)
         return weft_fail_errno(
@@ -186,7 +170,7 @@ weft_err weft_daemon_call(const char *path_of_socket, const char *method, const 
                           const json_t *body, json_t **reply, weft_error *err)
 {
     text raw = {0};
-    const int fd = dial(path_of_socket);
+    const int fd = weft_unix_socket_connect(path_of_socket);
     if (fd < 0)
         return weft_fail_errno(err, WEFT_ERR_DEVICE, "%s: the daemon does not answer", path_of_socket);
     weft_err status = send_request(fd, method, path, body, err);
@@ -281,7 +265,7 @@ weft_err weft_daemon_watch(const char *path_of_socket, const char *query, weft_d
     event_reader r = {.event = event, .context = context};
     char path[200];
     snprintf(path, sizeof path, "/v1/events%s", query);
-    const int fd = dial(path_of_socket);
+    const int fd = weft_unix_socket_connect(path_of_socket);
     if (fd < 0)
         return weft_fail_errno(err, WEFT_ERR_DEVICE, "%s: the daemon does not answer", path_of_socket);
     weft_err status = send_request(fd, "GET", path, NULL, err);

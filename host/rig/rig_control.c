@@ -2,6 +2,7 @@
 
 #include "core/mem.h"
 #include "core/progress.h"
+#include "core/unix_socket.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -38,24 +39,11 @@ static weft_err make_address(const char *path, struct sockaddr_un *address, weft
     return WEFT_OK;
 }
 
-/* -1 when nobody answers there. */
-static int dial(const struct sockaddr_un *address)
-{
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)address, sizeof *address) == 0)
-        return fd;
-    const int reason = errno;
-    if (fd >= 0)
-        close(fd);
-    errno = reason;
-    return -1;
-}
-
 weft_err weft_rig_control_create(const char *path, weft_rig_control **control, weft_error *err)
 {
     struct sockaddr_un address;
     WEFT_TRY(make_address(path, &address, err));
-    const int other = dial(&address);
+    const int other = weft_unix_socket_connect(path);
     if (other >= 0) {
         close(other);
         return weft_fail(err, WEFT_ERR_EXISTS,
@@ -243,12 +231,10 @@ static weft_err converse(int fd, const char *line, double timeout_s, json_t **re
 weft_err weft_rig_control_tell(const char *path, const char *line, double timeout_s, json_t **reply,
                                weft_error *err)
 {
-    struct sockaddr_un address;
-    WEFT_TRY(make_address(path, &address, err));
     if (strchr(line, '\n') || strlen(line) >= MAX_LINE - 1)
         return weft_fail(err, WEFT_ERR_USAGE, "a command to the rig is one line of less than %d bytes",
                          MAX_LINE);
-    const int fd = dial(&address);
+    const int fd = weft_unix_socket_connect(path);
     if (fd < 0)
         return weft_fail_errno(err, WEFT_ERR_DEVICE,
                                "%s: no virtual scanner answers; start one with \"weft rig --dir\"", path);
