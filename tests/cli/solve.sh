@@ -3,22 +3,15 @@
 set -eu
 . "$WEFT_TEST_SOURCE/tests/support/script.sh"
 
-# 16-bit grey PNGs of a flat matte plate (z up, albedo 0.5) under five lights, written by hand
+# 16-bit grey PNGs of a flat matte plate (z up, albedo 0.5) under five lights
 python3 - <<'PY'
-import os, struct, zlib
+import os, pngfile
 lights = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0, -0.6, 0.8)]
-def png(path, value, w=32, h=24):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    rows = (b"\0" + struct.pack(">H", value) * w) * h
-    with open(path, "wb") as f:
-        f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", w, h, 16, 0, 0, 0, 0))
-                + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 os.mkdir("flat")
 with open("flat/flat.lp", "w") as f:
     print(len(lights), file=f)
     for i, (x, y, z) in enumerate(lights):
-        png(f"flat/p{i}.png", round(65535 * 0.5 * z))
+        pngfile.write(f"flat/p{i}.png", 32, 24, 16, 1, [[round(65535 * 0.5 * z)] * 32] * 24)
         print(f"p{i}.png {x} {y} {z}", file=f)
 PY
 

@@ -32,7 +32,7 @@ render shifted --sample white --scene shifted.json
 render chart --sample munsell --exposure 0.004,0.01,0.02,0.04
 cp -r good/truth.cal scanner.cal
 python3 - <<'PY'
-import json, shutil, struct, zlib, math
+import json, math, pngfile, shutil
 def edit(source, target, change):
     shutil.copytree(source, target)
     s = json.load(open(f"{target}/set.json"))
@@ -48,10 +48,7 @@ edit("good/white.set", "swapped.set", swap)
 edit("good/flat.set", "swapped-scan.set", swap)
 edit("good/white.set", "missing.set", lambda s: s.update(frames=[f for f in s["frames"] if f.get("light") != 7]))
 def png(path, width, height, pixel):
-    rows = b"".join(b"\0" + bytes(pixel(u, v) for u in range(width)) for v in range(height))
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
-                           + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+    pngfile.write(path, width, height, 8, 1, [[pixel(u, v) for u in range(width)] for v in range(height)])
 def board(u, v, u0, v0, side, soft):
     x, y = (u - u0) / side, (v - v0) / side
     if not (0 < x < 10 and 0 < y < 7):

@@ -70,7 +70,9 @@ jq -e '.sensor.noise | .shot * 30000 > 0.9 and .shot * 30000 < 1.1 and .gain == 
 jq -e --slurpfile set own.set/set.json '.frame == ($set[0].frames[] | select(.light == 3 and .capture.bracket == 0))' \
     own.set/Harris-Tweed-7_light03_0.0025s.dng.json >tell.out || fail "a sidecar differs from set.json"
 "$weft" rig --dir r --tell "truth t" >tell.out || fail "truth"
-"$weft" solve own.set -c t/truth.cal -o own.maps -q || fail "solve of the set with brackets"
+"$weft" solve own.set -c t/truth.cal -o own.maps --height poisson -q || fail "solve of the set with brackets"
+jq -e '.result | .height == (.height | floor) and .width > .height and .height > 100 and .height_map.method == "poisson" and
+    .height_map.relief_mm > 0' own.maps/maps.json >tell.out || fail "maps.json: $(jq -c .result own.maps/maps.json)"
 
 # A wire that goes to another lamp: the controller says all is well, the picture does not.
 "$weft" rig --dir r --tell "board lamp 5 as 2" >tell.out || fail "board lamp 5 as 2"
