@@ -57,6 +57,7 @@ expect_patiently() {
 
 # starts flashing $pty in the background and waits until avrdude writes
 flash_until_writing() {
+    : >flash.err # nothing of an earlier one: the new one may not have begun when this first looks
     "$weft" flash --port "$pty" -v >flash.out 2>flash.err &
     flasher=$!
     until grep -q 'avrdude: writing' flash.err; do
