@@ -28,6 +28,7 @@ endfunction()
 
 # weft_test(check_NAME [SOURCES more.c] [LIBS x y] [TIMEOUT s] [SERIAL]): a cmocka program from check_NAME.c in this folder.
 # Exit status 77 is "skipped"; the program says why.  SERIAL: uses the virtual scanner's or its board's devices alone.
+# SERIAL gives the label "clock": what runs against the machine's clock, which ./dev test tries a second time.
 function(weft_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${name}.c ${ARG_SOURCES})
@@ -55,6 +56,6 @@ function(weft_test_properties name timeout serial)
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT ${timeout}
     ENVIRONMENT "WEFT_SOCKET=none;WEFT_TEST_BIN=${CMAKE_BINARY_DIR}/bin;WEFT_TEST_SOURCE=${CMAKE_SOURCE_DIR};WEFT_TEST_BUILD=${CMAKE_BINARY_DIR};WEFT_TEST_SANITIZE=${sanitized};ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;OPENBLAS_NUM_THREADS=1")
   if(serial)
-    set_tests_properties(${name} PROPERTIES RESOURCE_LOCK rig)
+    set_tests_properties(${name} PROPERTIES RESOURCE_LOCK rig LABELS clock)
   endif()
 endfunction()
