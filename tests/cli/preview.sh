@@ -99,20 +99,22 @@ for shape in plane sphere cylinder drape; do
     expect 0 '"kept":0' "$weft" preview weave.maps -o $shape.webp --shape $shape --turntable 4 --size 30x24 --draft --quality 100 --json
 done
 long=("$weft" preview -q weave.maps -o late.webp --shape drape --turntable 999 --size 240x240 --draft --resume)
-for frame in 001 003; do # each run is stopped when it has made a frame of its own
+for run in first second; do # each is stopped when it has made two frames of its own
+    frame=$(find . -path './late.webp.frames/*.png' | wc -l)
+    frame=late.webp.frames/$(printf %03d $((frame + 1))).png
     "${long[@]}" >out 2>&1 &
     runner=$! status=0
     for ((i = 0; i < 3000 && status == 0; i++)); do
-        [ ! -e late.webp.frames/$frame.png ] || break
+        [ ! -e "$frame" ] || break
         sleep 0.05
         kill -0 $runner 2>/dev/null || status=1
     done
     kill -INT $runner
     wait $runner || status=$?
     [ $status = 130 ]
-    [ -e late.webp.frames/$frame.png ]
+    [ -e "$frame" ]
     [ ! -e late.webp ]
-    [ $frame = 003 ] || touch -d @1000000000 late.webp.frames/000.png
+    [ $run = second ] || touch -d @1000000000 late.webp.frames/000.png
 done
 [ "$(stat -c %Y late.webp.frames/000.png)" = 1000000000 ]
 expect 1 'interrupted run' "$weft" preview weave.maps -o late.webp --turntable 4 --size 30x24
@@ -154,6 +156,7 @@ expect 2 'wants the INPUT' "$weft" preview -o x.png --match small.set -c x.cal
 
 # drawn again when a picture changes; what cannot be drawn leaves the picture as it was
 cp weave.maps/confidence.exr rough.exr
+: >watch.log
 "$weft" preview weave.maps -o weave.maps/watched.png --brdf ggx --param alpha=rough.exr --size 40x30 --watch >watch.log 2>&1 &
 watcher=$!
 await_lines() { # N WORDS: until the log has N lines with WORDS

@@ -99,15 +99,28 @@ cat first
 squeue -r
 
 say "the process of a task is killed in the middle"
-until read -r victim killed < <(python3 -c '
-import json
-busy = {}
-for line in open("maps/batch/events.jsonl"):
-    e = json.loads(line)
-    busy[e["set"]] = e["pid"] if e["event"] == "begin" else 0
-print(*next(f"{pid} {name}" for name, pid in busy.items() if pid).split())' 2>/dev/null) && kill -KILL "$victim"; do
-    sleep 0.05
-done
+read -r victim killed < <(python3 - <<'PY'
+import json, os, time
+def working(): # sets that were begun and not solved, with their processes
+    busy = {}
+    for line in open("maps/batch/events.jsonl"):
+        if line.endswith("\n"):
+            e = json.loads(line)
+            busy[e["set"]] = e["pid"] if e["event"] == "begin" else 0
+    return {name: pid for name, pid in busy.items() if pid}
+for _ in range(6000):
+    for name, pid in working().items():
+        try:
+            os.kill(pid, 9)
+        except ProcessLookupError:
+            continue
+        time.sleep(0.1) # it may have been at its last word
+        if working().get(name) == pid:
+            print(pid, name)
+            raise SystemExit
+    time.sleep(0.01)
+PY
+) || { echo "FAILED: no task was caught at work"; exit 1; }
 echo "killed process $victim: $killed"
 
 say "node n2 is drained"
