@@ -34,13 +34,15 @@ static double saturation_limit(const weft_set *set, int light)
     return set->cfa != WEFT_CFA_NONE ? limit : 0;
 }
 
-static double light_time(const weft_set *set, int light)
+static void sum_times(const weft_set *set, int light, double *time, double *gathered)
 {
-    double time = 0;
+    *time = *gathered = 0;
     for (int i = 0; i < set->n_frames; i++)
-        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light)
-            time += weft_set_frame_time(&set->frames[i]);
-    return time;
+        if (set->frames[i].role == WEFT_ROLE_LIGHT && set->frames[i].light == light) {
+            const double t = weft_set_frame_time(&set->frames[i]);
+            *time += t;
+            *gathered += t * weft_set_frame_mean_of(&set->frames[i]);
+        }
 }
 
 static weft_err load_light(const weft_set *set, int light, const weft_plate *ambient,
@@ -71,7 +73,7 @@ weft_err weft_light_plates_load(const weft_set *set, weft_light_reading reading,
     while (p->n < n && status == WEFT_OK) {
         weft_plate *const plate = &p->plate[p->n];
         p->most[p->n] = saturation_limit(set, p->n);
-        p->time[p->n] = light_time(set, p->n);
+        sum_times(set, p->n, &p->time[p->n], &p->gathered[p->n]);
         p->n++; /* a plate that fails half way is freed with the others */
         status = load_light(set, p->n - 1, present ? &ambient : NULL, reading, plate, err);
         if (status == WEFT_OK)
@@ -134,8 +136,8 @@ void weft_light_plates_know_noise(weft_light_plates *plates, const weft_set *set
     plates->noise = noise;
     for (int j = 0; j < plates->n; j++)
         if (frames[j] == 1) /* a lit frame's darkest tenth is an upper bound; a bracket knows better */
-            plates->plate[j].noise_floor =
-                fmin(plates->plate[j].noise_floor, sqrt(noise.read) / plates->time[j]);
+            plates->plate[j].noise_floor = fmin(plates->plate[j].noise_floor,
+                                                sqrt(noise.read / (plates->time[j] * plates->gathered[j])));
 }
 
 void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_row_in in[WEFT_LIGHTS_MAX])
@@ -148,6 +150,6 @@ void weft_light_plates_row(const weft_light_plates *plates, int row, weft_solve_
         in[j].least = (float)(3 * p->noise_floor);
         in[j].most = (float)plates->most[j];
         in[j].read = (float)(p->noise_floor * p->noise_floor);
-        in[j].shot = (float)(plates->noise.shot / plates->time[j]);
+        in[j].shot = (float)(plates->noise.shot / plates->gathered[j]);
     }
 }

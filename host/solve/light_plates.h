@@ -14,8 +14,9 @@ typedef struct weft_light_plates {
     int n, width, height; /* at solving size */
     weft_cfa cfa;         /* of mosaics at full size; NONE for grey and RGB, and at half size */
     weft_plate plate[WEFT_LIGHTS_MAX];
-    weft_noise noise;             /* of a frame, as parts of full scale; {0}: not known */
-    double time[WEFT_LIGHTS_MAX]; /* exposure times gain, s: of all frames of a bracket */
+    weft_noise noise;                 /* of a frame, as parts of full scale; {0}: not known */
+    double time[WEFT_LIGHTS_MAX];     /* exposure times gain, s: of a bracket the sum */
+    double gathered[WEFT_LIGHTS_MAX]; /* the same, each times how many frames its file is the mean of */
     double most[WEFT_LIGHTS_MAX]; /* WEFT_SATURATION_SHARE of the (shortest) exposure's range as linear value;
                                      0 for pictures */
 } weft_light_plates;

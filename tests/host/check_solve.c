@@ -277,6 +277,21 @@ static void test_noise_is_the_sensors(void **state)
     weft_light_plates_row(&plates, 3, in);
     assert_near((double)in[0].shot, 0.5e-4 / EXPOSURE, 1e-9);
     assert_near((double)in[0].read, 1e-12 / (EXPOSURE * EXPOSURE), 1e-14);
+    weft_light_plates_fini(&plates);
+
+    int first = 0; /* its file is the mean of four frames: a quarter of both variances */
+    while (made.frames[first].role != WEFT_ROLE_LIGHT || made.frames[first].light != 0)
+        first++;
+    json_t *const before = made.frames[first].capture;
+    made.frames[first].capture = json_pack("{s:i}", "mean_of", 4);
+    assert_ok(weft_light_plates_load(&made, WEFT_READ_SITES, &plates, err));
+    json_decref(made.frames[first].capture);
+    made.frames[first].capture = before;
+    weft_light_plates_know_noise(&plates, &set, &cal);
+    weft_light_plates_row(&plates, 3, in);
+    assert_near((double)in[0].shot, 0.125e-4 / EXPOSURE, 1e-9);
+    assert_near((double)in[1].shot, 0.5e-4 / EXPOSURE, 1e-9);
+    assert_near((double)in[0].read, 0.25e-12 / (EXPOSURE * EXPOSURE), 1e-14);
 
     set.noise_gain = 0;
     measured.other = json_pack("{s:{s:{s:f, s:[{s:f, s:f}]}}}", "reports", "linearity", "noise_gain", 1.0,
