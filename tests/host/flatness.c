@@ -1,5 +1,5 @@
-/* flatness MAPS: how flat the maps of a flat sheet are, as one JSON line.  Blocks of about 3 mm average the
- * noise of the pixels away: what they show is the calibration's. */
+/* flatness MAPS: how flat the maps of a flat sheet are, as one JSON line, beside what their uncertainty
+ * expects. Blocks of about 3 mm average the noise of the pixels away: what they show is the calibration's. */
 #include "core/error.h"
 #include "core/linalg.h"
 #include "host/set/maps.h"
@@ -11,7 +11,7 @@
 #define DEGREES       57.29577951308232
 
 typedef struct flatness {
-    double pixel_mean, block_mean, block_worst, lean_x, lean_y;
+    double pixel_mean, pixel_squares, expected_squares, block_mean, block_worst;
     long n_pixels, n_blocks;
 } flatness;
 
@@ -27,7 +27,11 @@ static void add_block(const weft_maps *maps, int u0, int v0, int side, flatness 
                                       (double)weft_image_row(&maps->normal, 1, v)[u],
                                       (double)weft_image_row(&maps->normal, 2, v)[u]};
             sum = weft_add(sum, normal);
-            f->pixel_mean += weft_angle_between(normal, (weft_vec3){0, 0, 1}) * DEGREES;
+            const double off = weft_angle_between(normal, (weft_vec3){0, 0, 1}) * DEGREES,
+                         expected = (double)weft_image_row(&maps->uncertainty, 0, v)[u];
+            f->pixel_mean += off;
+            f->pixel_squares += off * off;
+            f->expected_squares += expected * expected;
             f->n_pixels++;
             n++;
         }
@@ -54,11 +58,12 @@ int main(int argc, char **argv)
     for (int v = 0; v + side <= maps.height; v += side)
         for (int u = 0; u + side <= maps.width; u += side)
             add_block(&maps, u, v, side, &f);
-    printf(
-        "{\"pixel_mean_deg\": %.5f, \"block_mean_deg\": %.5f, \"block_worst_deg\": %.5f, \"block_px\": %d, "
-        "\"blocks\": %ld}\n",
-        f.pixel_mean / (double)f.n_pixels, f.block_mean / (double)f.n_blocks, f.block_worst, side,
-        f.n_blocks);
+    printf("{\"pixel_mean_deg\": %.5f, \"pixel_rms_deg\": %.5f, \"uncertainty_rms_deg\": %.5f, "
+           "\"block_mean_deg\": %.5f, \"block_worst_deg\": %.5f, \"block_px\": %d, "
+           "\"blocks\": %ld}\n",
+           f.pixel_mean / (double)f.n_pixels, sqrt(f.pixel_squares / (double)f.n_pixels),
+           sqrt(f.expected_squares / (double)f.n_pixels), f.block_mean / (double)f.n_blocks, f.block_worst,
+           side, f.n_blocks);
     weft_maps_fini(&maps);
     return 0;
 }
